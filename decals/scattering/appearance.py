@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
@@ -9,15 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from blobtree.validation import items
 from decals.errors import InvalidScattering
-from decals.model import Decals
+from decals.model import MAX_IMAGES, Decals
 from decals.scattering.decal_normals import mean_normals
 from decals.scattering.domain import Density, Domain, Mask, OrientedPoints
 from decals.scattering.extras import RULES
+from decals.scattering.jitter import Jitter
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
 from decals.scattering.sizing import EXPECTED_RADIUS, Sizing, delaunay_radii, touching_radii
-from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images
-from decals.validation import allowed_number, member
+from decals.validation import allowed_number, count_number, member, real_array, whole_number
 
 SAMPLES_PER_DECAL = 64
 """Samples for each decal from which its radius is measured."""
@@ -27,6 +29,27 @@ MIN_SAMPLES = 4096
 
 _SAMPLE_STREAM, _TRIAL_STREAM, _ANGLE_STREAM, _IMAGE_STREAM = 3, 4, 5, 6
 _POSITION_JITTER_STREAM, _SIZE_JITTER_STREAM, _ANGLE_JITTER_STREAM, _ZONE_STREAM = 7, 8, 9, 10
+
+
+class ImageChoice(Enum):
+    """Rules by which decals choose among several images; the weights set the share of each image.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> ball = decals.surfaces.ImplicitSurface(Point((0, 0, 0), radius=1.0))
+    >>> chosen = decals.scatter(ball, count=40, images=2, choice=decals.scattering.ImageChoice.SIZE)
+    >>> bool(chosen.radii[chosen.images == 0].max() <= chosen.radii[chosen.images == 1].min())
+    True
+    """
+
+    RANDOM = "random"
+    """At random."""
+    SIZE = "size"
+    """By radius: the first image for the smallest decals, the last for the largest."""
+    CURVATURE = "curvature"
+    """By curvature: the first image where the surface is flattest, the last where it bends most."""
 
 
 class PlacedZones(Protocol):
@@ -141,8 +164,9 @@ class Appearance:
         zones
             Zones with factors, directions and images of their own; this appearance is that of points outside.
         """
-        jitter = self.jitter or Jitter()
-        points = jitter.move(domain, points, spacings, movable, _stream(seed, _POSITION_JITTER_STREAM))
+        if self.jitter is not None:
+            stream = _stream(seed, _POSITION_JITTER_STREAM)
+            points = self.jitter.move(domain, points, spacings, movable, stream)
         images_at = points
         points, radii = self._with_radii(domain, points, spacings, movable, seed)
         styles = [(self, np.arange(len(points)))]
@@ -153,12 +177,14 @@ class Appearance:
         for style, rows in styles:
             factors[rows] = style.factor
             directions[rows] = style._directions(points, rows, _stream(seed, _ANGLE_STREAM))
-        radii = jitter.scale(factors * radii, _stream(seed, _SIZE_JITTER_STREAM))
+        radii = factors * radii
+        if self.jitter is not None:
+            radii = self.jitter.scale(radii, _stream(seed, _SIZE_JITTER_STREAM))
         chosen = np.zeros(len(points), np.int32)
         for style, rows in styles:
             chosen[rows] = style._chosen_images(images_at, radii, rows, seed)
-        if jitter.angle:
-            directions = jitter.turn(directions, points.normals, _stream(seed, _ANGLE_JITTER_STREAM))
+        if self.jitter is not None and self.jitter.angle:
+            directions = self.jitter.turn(directions, points.normals, _stream(seed, _ANGLE_JITTER_STREAM))
         return Decals(
             positions=points.positions,
             normals=points.normals,
@@ -228,3 +254,49 @@ class Appearance:
 def _stream(seed: int, purpose: int) -> int:
     """Derive a seed for one purpose, so that a change of one option does not affect the others."""
     return int(np.random.SeedSequence([seed, purpose]).generate_state(1, np.uint64)[0])
+
+
+def image_shares(images: int | Sequence[int], weights: ArrayLike | None) -> Float64Array:
+    """Return the share of each image up to the last that has one, or raise `InvalidScattering`.
+
+    `images` is a number of images, or the numbers of some; `weights` has one for each of them.
+    """
+    numbers = items(images)
+    if numbers is None:
+        count = count_number("images", images, 1, MAX_IMAGES, InvalidScattering)
+    else:
+        numbers = tuple(
+            whole_number("images", number, 0, MAX_IMAGES - 1, InvalidScattering) for number in numbers
+        )
+        count = len(numbers)
+        if count == 0 or len(set(numbers)) < count:
+            raise InvalidScattering(f"images: expected different numbers of images, got {list(numbers)}")
+    if weights is None:
+        shares = np.full(count, 1.0 / count)
+    else:
+        values = real_array("weights", weights, InvalidScattering)
+        if values.shape != (count,):
+            raise InvalidScattering(f"weights: expected shape [{count}], got {list(values.shape)}")
+        if not (np.isfinite(values).all() and (values >= 0).all() and values.sum() > 0):
+            raise InvalidScattering("weights: expected finite numbers from 0 upward, one of them above 0")
+        shares = values / values.sum()
+    if numbers is None:
+        return shares
+    of_all = np.zeros(max(numbers) + 1)
+    of_all[list(numbers)] = shares
+    return of_all
+
+
+def random_images(shares: Float64Array, count: int, seed: int) -> Int32Array:
+    """Draw images at random by their shares, ``int32[count]``."""
+    return np.random.default_rng(seed).choice(len(shares), size=count, p=shares).astype(np.int32)
+
+
+def ranked_images(shares: Float64Array, values: Float64Array) -> Int32Array:
+    """Assign images in the order of values, the first to the smallest, each by its share."""
+    count = len(values)
+    ranks = np.empty(count, np.int64)
+    ranks[np.argsort(values, kind="stable")] = np.arange(count)
+    levels = (ranks + 0.5) / max(count, 1)
+    images = np.searchsorted(np.cumsum(shares)[:-1], levels, side="right")
+    return images.astype(np.int32)

@@ -10,7 +10,7 @@ from blobtree.progress import Progress, reporting
 from blobtree.validation import point_array, truth
 from decals.errors import InvalidScattering
 from decals.model import Decals
-from decals.scattering.appearance import Appearance, PlacedZones
+from decals.scattering.appearance import Appearance, ImageChoice, PlacedZones
 from decals.scattering.domain import (
     Density,
     Domain,
@@ -22,6 +22,7 @@ from decals.scattering.domain import (
     remaining_counts,
 )
 from decals.scattering.extras import CARRIERS, FILLINGS, PLACEMENTS, RELOCATIONS, SEPARATIONS
+from decals.scattering.jitter import Jitter
 from decals.scattering.local_relaxation import relax_near
 from decals.scattering.neighbors import (
     CLOSE_DISTANCE,
@@ -34,7 +35,6 @@ from decals.scattering.orientation import Direction
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.repulsion import CUTOFF, law_at
 from decals.scattering.sizing import Sizing
-from decals.scattering.variation import ImageChoice, Jitter
 from decals.surfaces.surface import Surface
 from decals.validation import allowed_number, count_number, function_or_none, real_array, whole_number
 

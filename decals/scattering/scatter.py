@@ -15,8 +15,9 @@ from decals.errors import InvalidScattering
 from decals.index.build_kernels import list_cells
 from decals.model import Decals
 from decals.options import Values
-from decals.scattering.appearance import Appearance, ZonesOfModels
+from decals.scattering.appearance import Appearance, ImageChoice, ZonesOfModels
 from decals.scattering.domain import Density, Mask, as_surfaces, listed
+from decals.scattering.jitter import Jitter
 from decals.scattering.neighbors import CLOSE_DISTANCE
 from decals.scattering.orientation import Direction
 from decals.scattering.relaxation import Relaxation
@@ -24,7 +25,6 @@ from decals.scattering.repulsion_kernels import repel
 from decals.scattering.search_kernels import sample_around
 from decals.scattering.sizing import Sizing
 from decals.scattering.step_kernels import propose_moves
-from decals.scattering.variation import ImageChoice, Jitter
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_kernels import closest_points

@@ -18,7 +18,7 @@ from blobtree.nodes.paths import Path, node_in_world
 from blobtree.nodes.surgery import without_branches
 from blobtree.validation import describe
 from decals.errors import InvalidImage, InvalidScattering
-from decals.scattering.appearance import Appearance
+from decals.scattering.appearance import Appearance, ImageChoice, image_shares
 from decals.scattering.covering import random_points_around
 from decals.scattering.density import PaintedImage, grey_values, region_mask
 from decals.scattering.domain import (
@@ -34,7 +34,6 @@ from decals.scattering.domain import (
 )
 from decals.scattering.neighbors import FacingTree
 from decals.scattering.orientation import Direction, as_direction
-from decals.scattering.variation import ImageChoice, image_shares
 from decals.surfaces.convert import TREE_SUFFIXES
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface

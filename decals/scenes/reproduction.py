@@ -11,8 +11,8 @@ from decals.errors import ImplicitDecalsError
 from decals.model import COLUMNS, Decals
 from decals.scattering.density import PaintedImage
 from decals.scattering.image_projections import Planar
+from decals.scattering.jitter import Jitter
 from decals.scattering.scatter import scatter
-from decals.scattering.variation import Jitter
 from decals.scenes.provenance import changes_since, device_text, package_versions, provenance
 from decals.scenes.recipe import Recipe, shape_hash
 from decals.scenes.scene import Scene, require_scene

@@ -17,7 +17,7 @@ from decals.editing import ScatterDecals
 from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.experiments import LatinHypercube, Seeds, Sobol
 from decals.options import options_of
-from decals.scattering.variation import image_shares
+from decals.scattering.appearance import image_shares
 from decals.validation import count_number
 
 BALL = blobtree.Point((0, 0, 0), radius=1.0)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from decals import Relaxation, Sizing
 from decals.errors import InvalidScattering
 from decals.scattering import ImageChoice, Jitter
+from decals.scattering.appearance import image_shares, ranked_images
 from decals.scattering.orientation import max_curvatures
-from decals.scattering.variation import image_shares, ranked_images
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.sized_decals import covered
 

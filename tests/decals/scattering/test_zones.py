@@ -13,8 +13,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array
 from decals import Decals, Relaxation, Scene, TreeObject, measure, scatter
 from decals.errors import ImplicitDecalsError, InvalidScattering
 from decals.scattering import PaintedImage, Planar, Zone, Zones
-from decals.scattering.appearance import Appearance
-from decals.scattering.variation import image_shares
+from decals.scattering.appearance import Appearance, image_shares
 from decals.scenes.cover import fitting_camera
 from decals.scenes.objects import as_objects
 from decals.scenes.scene import as_images
