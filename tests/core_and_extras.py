@@ -48,7 +48,7 @@ EXTRAS: dict[str, str] = {
         """,
     "decals.scattering": """
         bare_places cell_corners center_normals copies covering creases deform density gap_filling
-        image_projections narrow_places owned_points polish rearrangement relocation remesh seen sheets zones
+        image_projections owned_points polish rearrangement relocation remesh seen sheets zones
         """,
     "decals.scenes": """
         animation area_gradient figure gaps measure outlines pose reproduction

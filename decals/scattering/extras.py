@@ -31,9 +31,8 @@ with if_present():
     from decals.scattering.covering import covering_decals
     from decals.scattering.deform import carried
     from decals.scattering.gap_filling import fill_gaps
-    from decals.scattering.narrow_places import reach_narrow_places
     from decals.scattering.polish import polish
-    from decals.scattering.relocation import PartShares, Relocation
+    from decals.scattering.relocation import PartShares, Relocation, reach_narrow_places
 
     RULES[Sizing.COVERING] = covering_decals
     RELOCATIONS += [Relocation, PartShares]

@@ -1,4 +1,4 @@
-"""Relocation: crowded particles move to gaps, and particles in excess to parts of trees that lack some."""
+"""Relocation: crowded particles move to gaps, to narrow places, and to parts of trees that lack some."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,9 +6,13 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
-from blobtree._typing import BoolArray, Float32Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
+from decals.model import FACING_LIMIT
+from decals.scattering.bare_places import spread_apart
 from decals.scattering.domain import AREA_SAMPLES, Domain, OrientedPoints, apportion
+from decals.scattering.gap_filling import EVEN
 from decals.scattering.neighbors import NeighborQuery, index_array, local_maxima
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.repulsion import particle_struct
@@ -41,7 +45,29 @@ THIN_REACH, THIN_SHARE = 4.0, 0.45
 SHARE_ERROR = 0.003
 """Allowed error of a part's number of particles, over its share; one particle always is."""
 
-_CANDIDATE_STREAM, _SAMPLE_STREAM = 1000, 1001
+FIRST_NARROW_SAMPLES, NARROW_SAMPLES = 16, 64
+"""Samples for each particle: in the first search for narrow places, and in a second one if that finds any."""
+
+MOST_FIRST_NARROW_SAMPLES, MOST_NARROW_SAMPLES = 100_000, 200_000
+"""Largest numbers of these samples."""
+
+UNREACHED = 1.0
+"""Distance from all facing particles, in spacings, beyond which a sample lies in a narrow place. In a
+hexagonal tiling no point is farther than 0.577."""
+
+NARROW = 1.8
+"""Distance, in spacings, beyond which at least one sample must lie: smaller gaps move no particle."""
+
+NARROW_APART = 0.9
+"""Least distance of particles that move to narrow places, in spacings."""
+
+NARROW_REACH = 2.0
+"""Distance from all particles, in spacings, from which samples count as equal."""
+
+MAX_NARROW_SHARE = 0.12
+"""Largest share of the particles that move to narrow places."""
+
+_CANDIDATE_STREAM, _SAMPLE_STREAM, _NARROW_STREAM = 1000, 1001, 1002
 
 
 class Relocation:
@@ -143,19 +169,24 @@ def relocate(
     maxima = local_maxima(candidates.positions[bare], gaps[bare], separations, device=state.device)
     targets = bare[maxima]
     targets = targets[np.argsort(-gaps[targets], kind="stable")]
-    moved: list[int] = []
-    filled: list[int] = []
     parts = state.domain.parts(state.points()[movers])
     parts_of_targets = state.domain.parts(candidates[targets])
-    for part in np.unique(parts):
-        own_movers = movers[parts == part].tolist()
-        own_targets = targets[parts_of_targets == part].tolist()
+    moved, filled = _paired(movers, parts, targets, parts_of_targets)
+    state.move_to(moved, candidates.positions[filled], candidates.normals[filled])
+    return moved
+
+
+def _paired(
+    movers: Int64Array, groups: NDArray[Any], targets: Int64Array, groups_of_targets: NDArray[Any]
+) -> tuple[Int64Array, Int64Array]:
+    """Return, of each group, as many movers as it has targets and these targets, the first of both."""
+    moved, filled = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for group in np.unique(groups):
+        own_movers, own_targets = movers[groups == group], targets[groups_of_targets == group]
         pairs = min(len(own_movers), len(own_targets))
-        moved += own_movers[:pairs]
-        filled += own_targets[:pairs]
-    rows = np.array(moved, np.int64)
-    state.move_to(rows, candidates.positions[filled], candidates.normals[filled])
-    return rows
+        moved.append(own_movers[:pairs])
+        filled.append(own_targets[:pairs])
+    return np.concatenate(moved), np.concatenate(filled)
 
 
 def gap_sizes(
@@ -227,13 +258,8 @@ class PartShares:
         filled = _largest(
             gaps, candidates.positions, sizes, samples.parts[lacking], -excess, gaps > 0.0, state.device
         )
-        moved = np.zeros(0, np.int64)
-        for index in range(len(self._domain.surfaces)):
-            rows = leaving[points.surface_ids[leaving] == index]
-            targets = filled[candidates.surface_ids[filled] == index][: len(rows)]
-            rows = rows[: len(targets)]
-            state.move_to(rows, candidates.positions[targets], candidates.normals[targets])
-            moved = np.concatenate([moved, rows])
+        moved, filled = _paired(leaving, points.surface_ids[leaving], filled, candidates.surface_ids[filled])
+        state.move_to(moved, candidates.positions[filled], candidates.normals[filled])
         return moved
 
     def _drawn(self) -> _Samples:
@@ -273,3 +299,41 @@ def _largest(
         rows = rows[maxima]
         chosen.append(rows[np.argsort(-values[rows], kind="stable")][: counts[part]])
     return np.concatenate(chosen)
+
+
+def reach_narrow_places(state: ParticleState) -> Int64Array:
+    """Move crowded particles to narrow places and hold them there; return those that moved.
+
+    A narrow place has too little area for a particle of its own, and its normals differ so much from those
+    around it that no particle there faces it: the inner side of a rim, the edge of a plate. Repulsion would
+    push its particles out, so they no longer move. Where the density is not even, all stay.
+
+    Parameters
+    ----------
+    state
+        The particles, about at rest.
+    """
+    sizes = state.host_sizes
+    if state.domain.has_thin_parts or sizes.max() > EVEN * sizes.min():
+        return np.zeros(0, np.int64)
+    if not len(_unreached(state, min(FIRST_NARROW_SAMPLES * state.count, MOST_FIRST_NARROW_SAMPLES))[1]):
+        return np.zeros(0, np.int64)
+    samples, gaps = _unreached(state, min(NARROW_SAMPLES * state.count, MOST_NARROW_SAMPLES))
+    if gaps.max(initial=0.0) <= NARROW:
+        return np.zeros(0, np.int64)
+    distances = np.full(len(samples), NARROW_APART * state.spacing)
+    targets = samples[spread_apart(samples, gaps, distances, FACING_LIMIT)]
+    movers = most_crowded(state, np.flatnonzero(state.movable), int(MAX_NARROW_SHARE * state.count))
+    moved, filled = _paired(movers, state.surface_ids[movers], np.arange(len(targets)), targets.surface_ids)
+    state.move_to(moved, targets.positions[filled], targets.normals[filled])
+    state.hold(moved)
+    return moved
+
+
+def _unreached(state: ParticleState, count: int) -> tuple[OrientedPoints, Float64Array]:
+    """Return those of so many samples that lie in narrow places, and their distances in spacings."""
+    domain = state.domain
+    samples = domain.sample(apportion(domain.masses, count), stream=_NARROW_STREAM)
+    gaps = NeighborQuery(state, NARROW_REACH).owners(samples.positions, samples.normals)[0]
+    rows = np.flatnonzero(gaps > UNREACHED)
+    return samples[rows], gaps[rows].astype(np.float64)
