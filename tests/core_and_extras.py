@@ -47,7 +47,7 @@ EXTRAS: dict[str, str] = {
         walk_cache
         """,
     "decals.scattering": """
-        bare_places cell_corners center_normals copies covering creases deform density gap_filling
+        bare_places center_normals copies covering creases deform density gap_filling
         image_projections owned_points polish rearrangement relocation remesh seen sheets zones
         """,
     "decals.scenes": """

@@ -8,12 +8,19 @@ import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.progress import reporting
-from decals.scattering.cell_corners import power_corners, surely_covered
 from decals.scattering.decal_normals import DecalNormals
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.gap_filling import EVEN
 from decals.scattering.neighbors import FacingTree, NearestFacing
-from decals.scattering.owned_points import CANDIDATES, DOUBTFUL, Centers, OwnedPoints, Shade
+from decals.scattering.owned_points import (
+    CANDIDATES,
+    DOUBTFUL,
+    Centers,
+    OwnedPoints,
+    Shade,
+    power_corners,
+    surely_covered,
+)
 from decals.scattering.rearrangement import rearranged
 from decals.scattering.sheets import on_single_sheets
 from decals.scattering.sizing import EXPECTED_RADIUS, WithNormals

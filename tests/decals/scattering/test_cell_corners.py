@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from decals.scattering.cell_corners import power_corners, surely_covered
 from decals.scattering.domain import OrientedPoints
-from decals.scattering.owned_points import Centers, OwnedPoints
+from decals.scattering.owned_points import Centers, OwnedPoints, power_corners, surely_covered
 
 UP = np.array([0, 0, 1], np.float32)
 PEAK = 0.4
