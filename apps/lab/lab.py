@@ -352,10 +352,12 @@ class Lab:
             self._put_probe(self.probe if plane else self.lesson.settings.probe)
 
     def _put_probe(self, place: Any) -> None:
-        """Put the probe at a place, or at the point of the slice that is nearest to it."""
+        """Put the probe at a place, or at the point of the slice that is nearest to it, and show it."""
         x, y, z = np.array(place if self._plane is None else self._plane.nearest(place)).tolist()
         self.probe = x, y, z
-        self._mark_probe()
+        ball = pv.Sphere(radius=PROBE_SIZE * self.lesson.size, center=self.probe)
+        look: Any = {"color": "white", "pickable": False, "reset_camera": False, "render": False}
+        self._window.plotter.add_mesh(ball, name="probe", **look)
 
     def _relax(self, recording: Recording) -> None:
         """Show the step that was asked for, or the last one that a thread knows in time."""
@@ -387,12 +389,6 @@ class Lab:
     def check(self) -> None:
         """Check the answer: the verdict appears once it is computed, until the scene changes."""
         self._asking = True
-
-    def _mark_probe(self) -> None:
-        """Show the probe in the view."""
-        ball = pv.Sphere(radius=PROBE_SIZE * self.lesson.size, center=self.probe)
-        look: Any = {"color": "white", "pickable": False, "reset_camera": False, "render": False}
-        self._window.plotter.add_mesh(ball, name="probe", **look)
 
 
 def measured(

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.cube import cube_cells
 from decals.apps.sandbox.decal_panel import brush_values
+from decals.apps.sandbox.hover import in_view
 from decals.editing.background import Job, Worker
 from decals.editing.gizmo import AXES, Handle, Ray
 from decals.editing.slicing import CHOICES as SLICES
@@ -271,7 +272,8 @@ class Display:
         handles: list[dict[str, Any]] = []
         lines: list[list[float]] = []
         for group in groups:
-            places = self._in_view(pixels_of(self._window.subplot, [handle.position for handle in group]))
+            pixels = pixels_of(self._window.subplot, [handle.position for handle in group])
+            places = in_view(self._window, pixels).tolist()
             for handle, (x, y) in zip(group, places, strict=True):
                 if np.isfinite(x):
                     handles.append({"name": handle.name, "x": x, "y": y})
@@ -293,16 +295,10 @@ class Display:
         _, target = self._window.camera.eye_and_target()
         return round(radius * GIZMO_SIZE / self._gizmo_length(target), 4)
 
-    def _in_view(self, pixels: ArrayLike) -> list[list[float]]:
-        """Return pixels as parts of the view's width, and of its height from the top."""
-        places = (np.asarray(pixels, np.float64).reshape(-1, 2) + 0.5) / self._window.plotter.window_size
-        places[:, 1] = 1.0 - places[:, 1]
-        listed: list[list[float]] = places.round(4).tolist()
-        return listed
-
     def selection_line(self) -> str:
         """Return the box or lasso that is being drawn, as points of an SVG of the size 1."""
-        return " ".join(f"{x},{y}" for x, y in self._in_view(self._window.tools.selection_line))
+        line = in_view(self._window, self._window.tools.selection_line)
+        return " ".join(f"{x},{y}" for x, y in line.tolist())
 
     def _gizmo_length(self, middle: ArrayLike) -> float:
         """Return the length of axes from a point, in model units: the same in all pictures of a size."""

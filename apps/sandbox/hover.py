@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree import Node, polygonize
-from blobtree._typing import Float32Array
+from blobtree._typing import Float32Array, Float64Array
 from blobtree.nodes.paths import node_in_world
 from decals.editing.document import Document
 from decals.editing.outline_actions import Part
@@ -110,16 +110,21 @@ class Hover:
         facing = ((eye - self._dots[:, 0]) * self._dots[:, 2]).sum(axis=1) > 0.0
         return {
             "rows": [],
-            "lines": self._in_view(self._lines.reshape(-1, 3), 4),
-            "dots": self._in_view(self._dots[facing][:MAX_DOTS, :2].reshape(-1, 3), 4),
+            "lines": self._in_view(self._lines),
+            "dots": self._in_view(self._dots[facing][:MAX_DOTS, :2]),
         }
 
-    def _in_view(self, points: Float32Array, width: int) -> list[list[float]]:
-        """Return points as parts of the view's width, and of its height from the top, in rows of a width."""
-        places = pixels_of(self._window.subplot, points) + 0.5
-        rows = (places / self._window.plotter.window_size * (1, -1) + (0, 1)).reshape(-1, width)
-        listed: list[list[float]] = rows[np.isfinite(rows).all(axis=1)].round(4).tolist()
+    def _in_view(self, pairs: Float32Array) -> list[list[float]]:
+        """Return pairs of points (n, 2, 3), where both are in front of the eye, as places of the view."""
+        rows = in_view(self._window, pixels_of(self._window.subplot, pairs.reshape(-1, 3))).reshape(-1, 4)
+        listed: list[list[float]] = rows[np.isfinite(rows).all(axis=1)].tolist()
         return listed
+
+
+def in_view(window: EditWindow, pixels: ArrayLike) -> Float64Array:
+    """Return pixels (n, 2) as parts of the view's width, and of its height from the top."""
+    places = (np.asarray(pixels, np.float64).reshape(-1, 2) + 0.5) / window.plotter.window_size
+    return np.asarray(places * (1, -1) + (0, 1), np.float64).round(4)
 
 
 def _drawn(node: Node, *, box: bool) -> Float32Array:
@@ -139,9 +144,8 @@ def outlines(node: Node) -> Float32Array:
 def _box_of(document: Document, part: Part) -> Float32Array:
     """Return the edges of the box of a node or an object, shape (12, 2, 3)."""
     item = document.object(part.number)
-    if isinstance(item, TreeObject):
-        return np.stack(box_edges(*node_in_world(item.tree, part.path).bounds))
-    return np.stack(box_edges(*item.bounds))
+    shown = node_in_world(item.tree, part.path) if isinstance(item, TreeObject) else item
+    return np.stack(box_edges(*shown.bounds))
 
 
 def _decals_of(document: Document, part: Part) -> Float32Array:

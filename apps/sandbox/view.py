@@ -184,11 +184,8 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
 
         The window may have the new size already: trame sets it with the quality.
         """
-        if (
-            self._drawn_size
-            and self._window.plotter.render_window
-            and self._drawable_size() != self._drawn_size
-        ):
+        drawn = self._drawn_size and self._window.plotter.render_window
+        if drawn and self._drawable_size() != self._drawn_size:
             self.update()
 
     def _publish(self, image: bytes, size: tuple[int, int], **to: str) -> None:
