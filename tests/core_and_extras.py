@@ -30,7 +30,7 @@ EXTRAS: dict[str, str] = {
     "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",
     "decals.baking": "*",
     "decals.editing": """
-        bare_watch brush_actions brushes filling outline_actions overlays slicing visibility
+        bare_watch brush_actions brushes filling outline_actions overlays scatter_on_copies slicing visibility
         visibility_actions zone_actions
         """,
     "decals.experiments": "*",

@@ -704,7 +704,9 @@ def _commands(whole: decals.Scene, number: int, path: tuple[int, ...]) -> Calls:
         "TurnDecals": {"numbers": [0], "degrees": 10.0},
     }
 
-    def doer(name: str) -> Callable[..., object]:
-        return lambda **values: EditSession(whole).do(getattr(editing, name)(**values))
+    def doer(name: str, scene: decals.Scene) -> Callable[..., object]:
+        return lambda **values: EditSession(scene).do(getattr(editing, name)(**values))
 
-    return {name: (doer(name), values) for name, values in arguments.items()}
+    row = decals.cover(blobtree.Repeat(tree, (4, 0, 0), 2), count=2, images=["eye"])
+    on_row = {"ScatterOnCopies": (doer("ScatterOnCopies", row), arguments["ScatterDecals"])}
+    return {name: (doer(name, whole), values) for name, values in arguments.items()} | on_row

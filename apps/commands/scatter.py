@@ -30,6 +30,7 @@ from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing
 from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar, on_copies
+from decals.scattering.copies import repeats_at_root
 from decals.scattering.neighbors import ideal_spacing
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.scenes.recipe import Recipe
@@ -134,7 +135,7 @@ def scatter(
             raise InvalidInput(f"expected a scene with objects, {model[0]!r} has none; add one with `edit`")
         own = loaded.images if images is None and isinstance(loaded, Scene) else ()
         pictures = own or scale_images(images or 1)
-        repeats = _repeats_of(objects, model[0]) if same_on_copies else []
+        repeats = _repeats_of(objects, model[0]) if same_on_copies else ()
         surfaces = [ImplicitSurface(repeats[-1].child)] if repeats else [item.surface for item in objects]
         copies = math.prod(repeat.count for repeat in repeats)
         if spacing is not None:
@@ -189,13 +190,10 @@ def scatter(
     print_path(output)
 
 
-def _repeats_of(objects: Sequence[SceneObject], model: str) -> list[Repeat | PolarRepeat]:
+def _repeats_of(objects: Sequence[SceneObject], model: str) -> tuple[Repeat | PolarRepeat, ...]:
     """Return the repeats at the root of the only model, the outer one first; InvalidInput without any."""
-    node = objects[0].tree if len(objects) == 1 and isinstance(objects[0], TreeObject) else None
-    repeats = []
-    while isinstance(node, Repeat | PolarRepeat):
-        repeats.append(node)
-        node = node.child
+    only = objects[0] if len(objects) == 1 else None
+    repeats = repeats_at_root(only.tree) if isinstance(only, TreeObject) else ()
     if not repeats:
         raise InvalidInput(
             f"--same-on-copies: expected one tree whose root is a Repeat or a PolarRepeat, got {model!r}; "

@@ -20,11 +20,13 @@ from decals.editing.scatter_commands import ScatterDecals
 from decals.editing.zone_actions import ZoneActions
 from decals.errors import InvalidEdit
 from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Decals
-from decals.options import arguments_of, described, options_of, values_of
+from decals.options import Option, Values, arguments_of, described, options_of, values_of
 from decals.receivers import labels_of
 from decals.rendering.options import Drawing
+from decals.scattering.copies import repeats_at_root
 from decals.scattering.scatter import scatter
 from decals.scenes.material import DecalMaterial
+from decals.scenes.objects import TreeObject
 from decals.scenes.scene import DecalImage
 from decals.validation import number_of, one_of
 
@@ -46,9 +48,13 @@ COLUMNS = {
 }
 """Arrays of `decals.Decals` by the names of their controls."""
 
-ZONE = "zone_density"
+ZONE, COPIES = "zone_density", "same_on_copies"
 SCATTER = {**options_of(scatter), ZONE: options_of(ZoneActions.scatter)[ZONE]}
-"""Options of the next scattering beside the images; the last one is for zones alone."""
+COPIES_DOC = (
+    "put the decals of one copy of a repeat on all of its copies, which share the count; not for zones"
+)
+SCATTER |= {COPIES: Option(COPIES, bool, COPIES_DOC, Values(label="same decals on all copies"), False, False)}
+"""Options of the next scattering beside the images; the last ones are for zones, and for repeats, alone."""
 
 NOT_OF_SCATTER = ("spacing",)
 """Options of `decals.scatter` that another option decides."""
@@ -196,10 +202,13 @@ def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool, **_other
     state.draw_with(f"set {name}", last=last, **{whole: value})
 
 
-def first_scatter_values(count: int) -> dict[str, Any]:
-    """Return the options of `decals.scatter` at the beginning, for a scene with a number of decals."""
-    first = {o.name: o.default for o in SCATTER.values() if o.name not in NOT_OF_SCATTER}
-    return {"images": ()} | first | {"count": count or FIRST_DECAL_COUNT}
+def scatter_values(document: Document, chosen: dict[str, Any]) -> dict[str, Any]:
+    """Return the options of the next scattering: those that were chosen, else the first ones."""
+    trees = [item.tree for item in document.objects if isinstance(item, TreeObject)]
+    left_out = NOT_OF_SCATTER if any(map(repeats_at_root, trees)) else (*NOT_OF_SCATTER, COPIES)
+    first = {name: option.default for name, option in SCATTER.items() if name not in left_out}
+    first |= {"images": (), "count": len(document.decals) or FIRST_DECAL_COUNT}
+    return first | {name: value for name, value in chosen.items() if name in first}
 
 
 def scatter_arguments(document: Document, values: dict[str, Any]) -> dict[str, Any]:

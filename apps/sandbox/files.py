@@ -206,12 +206,10 @@ class SandboxFiles:
 
     def point_at(self, place: object) -> ArrayLike | None:
         """Return the surface point at a place of the view, else the point there as far away as the target."""
-        pixel = self._pixel_at(place)
-        if pixel is None:
-            return None
-        if (pick := self._window.tools.at(*pixel)) is not None:
+        if (pick := self.surface_at(place)) is not None:
             return pick.position
-        return self._across(self._window.camera.eye_and_target()[1], pixel)
+        pixel = self._pixel_at(place)
+        return None if pixel is None else self._across(self._window.camera.eye_and_target()[1], pixel)
 
     def put(self, place: object, edge: object = "") -> tuple[ArrayLike | None, float | None]:
         """Return the middle (3,) of a part that is put at a place of the view, and its reach.

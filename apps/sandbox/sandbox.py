@@ -23,6 +23,7 @@ from decals.apps.sandbox.outline import group, icon, outline
 from decals.editing import new_nodes
 from decals.editing.action_state import joined
 from decals.editing.outline_actions import Part
+from decals.editing.scatter_on_copies import ScatterOnCopies
 from decals.editing.session import UndoEntry
 from decals.editing.tree_actions import FollowedNode
 from decals.errors import InvalidEdit
@@ -196,11 +197,9 @@ class Sandbox:
 
     def _pick(self) -> dict[str, str]:
         """Return what the last click met."""
-        state = self._state
-        if state.picked is not self._reported_pick[0]:
-            pick = state.picked
-            facts = {} if pick is None else self._trees.report(pick)
-            self._reported_pick = pick, facts
+        pick = self._state.picked
+        if pick is not self._reported_pick[0]:
+            self._reported_pick = pick, {} if pick is None else self._trees.report(pick)
         return self._reported_pick[1]
 
     @property
@@ -541,7 +540,11 @@ class Sandbox:
         """Cover the object of the selected node, or every object, with decals; each time another seed."""
         primitive, objects = self._state.primitive, range(len(self._window.document.objects))
         numbers = tuple(objects) if primitive is None else (primitive[0],)
-        self._scatter(partial(self._window.actions.decals.scatter_over, numbers))
+        values = self._scatter_values()
+        command: dict[str, Any] = {"command": ScatterOnCopies} if values.get(decal_panel.COPIES) else {}
+        if command:
+            self._scattering["count"] = values["count"]  # copies that touch have fewer: the next keeps it
+        self._scatter(partial(self._window.actions.decals.scatter_over, numbers, **command))
 
     @event
     def scatter_zone(self) -> None:
@@ -557,7 +560,7 @@ class Sandbox:
 
     def _scatter_values(self) -> dict[str, Any]:
         """Return the options of the next scattering: those that were set, else the first ones."""
-        return decal_panel.first_scatter_values(len(self._window.document.decals)) | self._scattering
+        return decal_panel.scatter_values(self._window.document, self._scattering)
 
     @event
     def change_row(self, key: str, change: str, value: Any = None) -> None:

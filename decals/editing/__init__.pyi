@@ -23,6 +23,7 @@ from .pointer_tools import PointerTools
 from .queries import first_hit, nearest_points, outline, pick
 from .recovery import recovery_path
 from .scatter_commands import AddObject, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals
+from .scatter_on_copies import ScatterOnCopies
 from .session import EditSession, UndoEntry
 from .tree_commands import (
     AddPrimitive,
@@ -95,6 +96,7 @@ __all__ = [
     "ResizePrimitive",
     "ScaleDecals",
     "ScatterDecals",
+    "ScatterOnCopies",
     "SetCamera",
     "SetDrawing",
     "SetParameter",

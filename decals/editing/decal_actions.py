@@ -236,11 +236,28 @@ class DecalActions(WindowActions):
         self.scatter_over((require_pick(cursor).object,))
 
     def scatter_over(
-        self, numbers: tuple[int, ...], count: int | None = None, seed: int | None = None, **options: Any
+        self,
+        numbers: tuple[int, ...],
+        count: int | None = None,
+        seed: int | None = None,
+        *,
+        command: type[ScatterDecals] = ScatterDecals,
+        **options: Any,
     ) -> None:
-        """Replace the decals on objects by scattered ones; without a count, by as many as there are.
+        """Replace the decals on objects by scattered ones.
 
-        The options are those of `ScatterDecals`. Default: another seed each time.
+        Parameters
+        ----------
+        numbers
+            Indices of the objects.
+        count
+            Number of decals. None stands for as many as there are, or 100.
+        seed
+            Random seed. Default: another one each time.
+        command
+            Class of the command.
+        options
+            Those of `ScatterDecals`.
         """
         document = self._state.session.document
         self._scatter_count += 1
@@ -251,7 +268,7 @@ class DecalActions(WindowActions):
         def compute(progress: Progress, cancel: Callable[[], bool]) -> Command:
             on = nearest_points(objects, positions).objects if count is None else np.zeros(0)
             wanted = (int(np.isin(on, numbers).sum()) or FIRST_DECAL_COUNT) if count is None else count
-            command = ScatterDecals(numbers, wanted, seed, options)
-            return command.compute_command(objects, images, progress=progress, cancel=cancel)
+            scattered = command(numbers, wanted, seed, options)
+            return scattered.compute_command(objects, images, progress=progress, cancel=cancel)
 
         self._state.background.compute("scatter", compute)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree import ISO, PolarRepeat, Repeat
+from blobtree import ISO, Node, PolarRepeat, Repeat
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.nodes.tree import Transform
 from blobtree.validation import describe
@@ -83,6 +83,15 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
         positions=np.where(moved, positions[kept], copies.positions[kept]),
         normals=np.where(moved, normals[kept], copies.normals[kept]),
     )
+
+
+def repeats_at_root(tree: Node) -> tuple[Repeat | PolarRepeat, ...]:
+    """Return the repeats at the root of a tree, the outer one first; none for another tree."""
+    repeats: list[Repeat | PolarRepeat] = []
+    while isinstance(tree, Repeat | PolarRepeat):
+        repeats.append(tree)
+        tree = tree.child
+    return tuple(repeats)
 
 
 def _on_surface(

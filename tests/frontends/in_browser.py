@@ -1009,13 +1009,16 @@ async def fields() -> None:
         await browser.get_by_role("button", name="undo").first.click()
         await until(lambda: window.session.undone_labels == ("set radius",))
         await expect(field).to_have_value("0.5")
-        for text in ("0.7", "0.5"):
-            await field.fill(text)
-            await browser.keyboard.press("Escape")
-            await expect(field).to_have_value("0.5")
-            await until(lambda text=text: (keys.primitive is None) == (text == "0.5"))  # type: ignore[misc]
-            await browser.get_by_text("Point", exact=True).nth(1).click()
-            await until(lambda: keys.primitive == (0, (1,)))
+        await field.fill("0.7")
+        await browser.keyboard.press("Escape")
+        await expect(field).to_have_value("0.5")
+        assert keys.primitive == (0, (1,))
+        await field.fill("0.5")  # its own value: Escape deselects the node, whose field goes
+        await browser.keyboard.press("Escape")
+        await expect(field).to_have_count(0)
+        assert keys.primitive is None
+        await browser.get_by_text("Point", exact=True).nth(1).click()
+        await until(lambda: keys.primitive == (0, (1,)))
         await browser.get_by_role("button", name="undo").first.focus()
         await browser.keyboard.press("Escape")
         await until(lambda: keys.primitive is None)
@@ -1154,6 +1157,37 @@ async def build_snowman(browser: Page, window: EditWindow, *, touch: bool) -> in
         await press(browser.get_by_label("right panel").first)
     await press(browser.get_by_role("button", name=re.compile("^save")))
     return next(clicks)
+
+
+async def copies() -> None:
+    """The copies of a repeat get the same decals, if a switch says so; undo takes them back."""
+    async with sandboxed(decals.cover(BLOB, count=60, images=["tile"])) as (browser, _, window):
+        await browser.get_by_text("Sum", exact=True).click()
+        await browser.get_by_role("button", name="Modify", exact=True).click()
+        await browser.locator(".v-overlay--active .v-list-item").get_by_text("Repeat", exact=True).click()
+        await until(
+            lambda: window.session.labels[-1:] == ("put Sum under Repeat",) and not window.background.busy
+        )
+        field = browser.get_by_role("textbox", name="step 1", exact=True)
+        await field.fill("6")
+        await field.press("Enter")
+        await until(lambda: window.session.labels[-1:] == ("set step",) and not window.background.busy)
+        repeat: Any = tree_of(window.document)
+        before = digest(window.document)
+        await browser.get_by_role("button", name="Scattering", exact=True).click()
+        field = browser.get_by_role("textbox", name="count", exact=True).first
+        await field.fill(str(20 * repeat.count))
+        await field.press("Enter")
+        await browser.get_by_label("same decals on all copies").click()
+        await accessible(browser)
+        await browser.get_by_role("button", name="Scatter again").click()
+        await until(lambda: window.session.labels[-1:] == ("scatter",) and not window.busy)
+        first, *others = np.split(window.document.decals.column("positions"), repeat.count)
+        for number, positions in enumerate(others, 1):
+            np.testing.assert_allclose(positions, first + number * np.array(repeat.step), atol=1e-4)
+        await show_all(browser, window)
+        await browser.get_by_label("undo").first.click()
+        await until(lambda: digest(window.document) == before)
 
 
 async def filled() -> None:
@@ -1489,6 +1523,7 @@ def main() -> None:
         "panels": panels,
         "fields": fields,
         "filled": filled,
+        "copies": copies,
         "zone": zone,
         "snowman": snowman,
         "shared": shared,

@@ -57,6 +57,7 @@ def require(*modules: str) -> None:
         "panels",
         "fields",
         "filled",
+        "copies",
         "zone",
         "snowman",
         "shared",

@@ -55,7 +55,7 @@ ODD += [{"a": 1}, "\0", "x" * 3000, [[1, [2]]], -(2**40), b"\xff"]
 KEYS_OF_ROWS = ["", "0", "0/0", "0/1", "0/1/0", "object 0", "object 1", "image 0", "1", "9/9", "-1", "a/b"]
 UNDONE = ("close", "camera", "move", "add_image", "save", "save_as", "export")
 ACTIONS = [binding.action for binding in KEYS.bindings if binding.action not in UNDONE]
-KINDS = ["Point", "Torus", "Box", "Twist", "Offset", "Union", "Difference", "Nothing"]
+KINDS = ["Point", "Torus", "Box", "Twist", "Repeat", "Offset", "Union", "Difference", "Nothing"]
 NAMES = ["radius", "center", "degrees", "color", "opacity", "layer", "image", "tint", "spill", "interaction"]
 OPTIONS = ["mode", "overlay", "slice", "slice_position", "slice_normal", "up", "orthographic", "axes"]
 SHOWN = ["traced", "polygonized", "normals", "none", "seeds", "owners", "folds", "contact lines", "x", "z"]
@@ -110,8 +110,8 @@ EVENTS: dict[str, list[list[Any]]] = {
     ],
     "set_control scattering": [
         ["scattering"],
-        ["count", "factor", "sizing", "jitter.size", "images", "zone_density"],
-        [3, "10", 0.5, "touching", ["scale"]],
+        ["count", "factor", "sizing", "jitter.size", "images", "zone_density", "same_on_copies"],
+        [3, "10", 0.5, "touching", ["scale"], True],
     ],
     "set_control image": [["image"], ["roughness", "relief"], [0.2, 0.5], [True, False]],
     "change_row": [KEYS_OF_ROWS, CHANGES, ["name", "0/1", "0"]],

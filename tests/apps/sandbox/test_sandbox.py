@@ -706,6 +706,50 @@ def test_the_ghost_under_the_mouse_is_what_a_press_adds_there(window: EditWindow
         finish(window)
 
 
+def test_all_copies_of_a_repeat_get_the_same_decals(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+
+    def offered() -> bool:
+        return "same_on_copies" in [control["name"] for control in sandbox.values()["scattering"]]
+
+    assert not offered()
+    sandbox.set_control("scattering", "same_on_copies", True)
+    assert "option: expected" in sandbox.status
+    sandbox.select("0")
+    sandbox.wrap("Repeat")
+    finish(window)
+    sandbox.set_control("node", "step", 5.0, index=[0])
+    finish(window)
+    repeat: Any = tree_of(window.document)
+    assert offered()
+    before = digest(window.document)
+    sandbox.set_control("scattering", "count", 10 * repeat.count)
+    sandbox.set_control("scattering", "same_on_copies", True)
+    for number in (1, 2):  # each time with another seed, and as many
+        sandbox.scatter()
+        finish(window)
+        assert window.session.labels[-number:] == ("scatter",) * number
+        first, *others = np.split(window.document.decals.column("positions"), repeat.count)
+        assert len(first) == 10
+        for copy, positions in enumerate(others, 1):
+            np.testing.assert_allclose(positions, first + copy * np.array(repeat.step), atol=1e-5)
+    for _ in range(2):
+        sandbox.perform("undo")
+    finish(window)
+    assert digest(window.document) == before
+    sandbox.select("")
+    sandbox.add("Torus")
+    finish(window)
+    sandbox.select("1")
+    sandbox.scatter()
+    finish(window)
+    assert "expected one object whose root is a Repeat" in sandbox.status
+    sandbox.set_control("scattering", "same_on_copies", False)
+    sandbox.scatter()
+    finish(window)
+    assert window.session.labels[-1] == "scatter"
+
+
 def test_the_queue_lists_work_and_each_entry_can_be_removed(window: EditWindow) -> None:
     sandbox = Sandbox(window)
     sandbox.set_control("scattering", "count", 60)

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals import DecalImage, MeshObject, TreeObject
+from blobtree import Repeat
+from decals import DecalImage, MeshObject, TreeObject, cover, scatter
 from decals.editing import (
     AddDecals,
     AddImage,
@@ -23,6 +24,7 @@ from decals.editing import (
     ReplaceImage,
     ScaleDecals,
     ScatterDecals,
+    ScatterOnCopies,
     SetCamera,
     SetValues,
     TurnDecals,
@@ -163,6 +165,23 @@ def test_scattering_replaces_the_coat_of_one_object(session: EditSession) -> Non
     assert again.decals.packed().tobytes() == change.after.decals.packed().tobytes()
 
 
+@pytest.mark.parametrize(("count", "each"), [(40, 10), (41, 11), (1, 1), (0, 0)])
+def test_copies_of_a_repeat_share_the_count_and_show_the_same_decals(count: int, each: int) -> None:
+    wall = Repeat(Repeat(TREE, (6, 0, 0), 2), (0, 0, 6), 2)
+    session = EditSession(cover(wall, count=7, images=["eye"]))
+    before = digest(session.document)
+    session.do(ScatterOnCopies((0,), count, seed=5))
+    decals = session.document.decals.decals
+    assert len(decals) == 4 * each
+    alone = scatter(TREE, count=each, seed=5)
+    for copy, offset in enumerate(((0, 0, 0), (6, 0, 0), (0, 0, 6), (6, 0, 6))):
+        part = decals[copy * each : (copy + 1) * each]
+        np.testing.assert_allclose(part.positions, alone.positions + offset, atol=1e-5)
+        np.testing.assert_allclose(part.tangents, alone.tangents, atol=1e-5)
+    session.undo()
+    assert digest(session.document) == before
+
+
 def test_relaxing_parts_those_that_crowd_and_leaves_the_far_ones(session: EditSession) -> None:
     document = session.document
     session.do(ReplaceDecals((0, 1), scene(400).decals))
@@ -250,6 +269,10 @@ NAN = np.array([np.nan, 0, 0], np.float32)
         (RelaxDecals(NAN), InvalidEdit, "point"),
         (ScatterDecals((2,), 5), InvalidEdit, "object: .* from 0 to 1, got 2"),
         (ScatterDecals((0,), -5), InvalidEdit, "got -5"),
+        (ScatterOnCopies((0,), 5), InvalidEdit, "one object whose root is a Repeat"),
+        (ScatterOnCopies((0, 1), 5), InvalidEdit, "one object whose root is a Repeat"),
+        (ScatterOnCopies((0,), 5, mask=len), InvalidEdit, "mask: expected none"),
+        (ScatterOnCopies((2,), 5), InvalidEdit, "object: .* from 0 to 1, got 2"),
         (ReplaceDecals((-1,), one()), InvalidEdit, "0 to 1, got -1"),
     ],
 )

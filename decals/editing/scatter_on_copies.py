@@ -1,0 +1,93 @@
+"""`ScatterOnCopies`: a command that scatters the same decals on all copies of a repeat."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from blobtree import PolarRepeat, Repeat
+from blobtree.progress import Progress
+from decals.editing.scatter_commands import (
+    MAX_SCATTERED_DECALS,
+    ReplaceDecals,
+    ScatterDecals,
+    object_indices,
+)
+from decals.errors import InvalidEdit
+from decals.scattering.copies import on_copies, repeats_at_root
+from decals.scenes.objects import SceneObject, TreeObject
+from decals.validation import whole_number
+
+
+class ScatterOnCopies(ScatterDecals):
+    """Distribute decals over one copy of a repeat, and put them on all copies.
+
+    The decals that lie on the object are deleted.
+
+    Parameters
+    ----------
+    objects
+        Index of the only object, such as ``(0,)``. The root of its tree is a repeat, or a grid of repeats.
+    count
+        Number of decals on all copies together. The copies share it equally, rounded up. Copies that touch
+        have fewer, see `decals.scattering.on_copies`.
+    seed
+        Random seed.
+    options
+        More arguments of `decals.scatter`, such as ``{"regularity": 0.5}``.
+    mask
+        None: zones do not lie on all copies.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point, Repeat
+    >>> from decals.editing import EditSession, ScatterOnCopies
+    >>> row = Repeat(Point((0, 0, 0), radius=1.0), (4, 0, 0), 3)
+    >>> session = EditSession(decals.cover(row, count=3, images=["eye"]))
+    >>> edit = session.do(ScatterOnCopies((0,), count=30))
+    >>> positions = session.document.scene.decals.positions
+    >>> (positions[10] - positions[0]).round(3).tolist()
+    [4.0, 0.0, 0.0]
+    """
+
+    def compute_command(
+        self,
+        objects: Sequence[SceneObject],
+        images: int,
+        *,
+        progress: Progress | None = None,
+        cancel: Callable[[], bool] | None = None,
+    ) -> ReplaceDecals:
+        """Distribute the decals, in any thread, and return the quick command that adds them.
+
+        The parameters are those of `ScatterDecals`.
+        """
+        self.check_values()
+        if self.mask is not None:
+            raise InvalidEdit("mask: expected none for the same decals on all copies; leave it out")
+        numbers = object_indices(self.objects)
+        for number in numbers:
+            whole_number("object", number, 0, len(objects) - 1, InvalidEdit)
+        covered = tuple(objects[number] for number in numbers)
+        item = covered[0] if len(covered) == 1 else None
+        repeats = repeats_at_root(item.tree) if isinstance(item, TreeObject) else ()
+        if item is None or not repeats:
+            raise InvalidEdit(
+                "same decals on all copies: expected one object whose root is a Repeat or a PolarRepeat, got "
+                f"{', '.join(item.name for item in covered)}; select such an object, or leave this out"
+            )
+        each = math.ceil(self.count / _number_of_copies(repeats))
+        if each * _number_of_copies(repeats) > MAX_SCATTERED_DECALS:
+            raise InvalidEdit(
+                f"same decals on all copies: expected at most {MAX_SCATTERED_DECALS:,} together, got "
+                f"{each:,} on each of {_number_of_copies(repeats):,} copies; take fewer"
+            )
+        one = TreeObject(item.name, repeats[-1].child, origin=item.origin)
+        on_one = ScatterDecals((0,), each, self.seed, self.options)
+        decals = on_one.compute_command((one,), images, progress=progress, cancel=cancel).decals
+        for repeat in reversed(repeats):
+            decals = on_copies(decals, repeat)
+        return ReplaceDecals(self.objects, decals, covered)
+
+
+def _number_of_copies(repeats: Sequence[Repeat | PolarRepeat]) -> int:
+    return math.prod(repeat.count for repeat in repeats)
