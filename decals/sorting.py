@@ -33,13 +33,26 @@ def groups(keys: Int64Array) -> tuple[Int64Array, Int64Array, Int64Array]:
     >>> first.tolist(), group.tolist(), counts.tolist()
     ([1, 3, 0], [2, 0, 2, 1], [1, 1, 2])
     """
-    order = stable_order(keys)
-    ordered = keys[order]
-    starts = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1])[: len(keys)])
-    counts = np.diff(np.append(starts, len(keys)))
+    order, starts, counts = runs(keys)
     group = np.empty(len(keys), np.int64)
     group[order] = np.repeat(np.arange(len(starts)), counts)
     return order[starts], group, counts
+
+
+def runs(keys: Int64Array) -> tuple[Int64Array, Int64Array, Int64Array]:
+    """Return the `stable_order` of numbers, and in it the start and the length of each run of equal ones.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> order, starts, counts = runs(np.array([7, 2, 7, 5]))
+    >>> order.tolist(), starts.tolist(), counts.tolist()
+    ([1, 3, 0, 2], [0, 1, 2], [1, 1, 2])
+    """
+    order = stable_order(keys)
+    ordered = keys[order]
+    starts = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1])[: len(keys)])
+    return order, starts, np.diff(np.append(starts, len(keys)))
 
 
 def distinct_numbers(numbers: WholeNumbers, count: int) -> Int64Array:

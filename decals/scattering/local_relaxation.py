@@ -37,7 +37,4 @@ def relax_near(
         if state.epoch_over:
             state.begin_epoch(LOCAL_LAW)
         state.step()
-    relaxed = state.points()
-    positions, normals = points.positions.copy(), points.normals.copy()
-    positions[near], normals[near] = relaxed.positions, relaxed.normals
-    return OrientedPoints(positions, normals, points.surface_ids)
+    return points.replaced(near, state.points())

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Int64Array
-from decals.sorting import distinct_numbers, stable_order
+from decals.sorting import distinct_numbers, runs
 from decals.surfaces.topology import components, first_copies, parts_of, welded
 from decals.surfaces.windings import Triangles
 
@@ -156,10 +156,7 @@ class _Edges:
         forward = starts < ends
         size = int(corners.max(initial=0)) + 1
         keys = np.minimum(starts, ends) * size + np.maximum(starts, ends)
-        order = stable_order(keys)
-        ordered = keys[order]
-        first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1])[: len(keys)])
-        counts = np.diff(np.append(first, len(keys)))
+        order, first, counts = runs(keys)
         self.border_faces: Int64Array = order[first[counts == 1]] // 3
         self.branching = int((counts > 2).sum())
         pairs = first[counts == 2]

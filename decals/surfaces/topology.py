@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
-from decals.sorting import distinct_numbers, groups, ranges, stable_order
+from decals.sorting import distinct_numbers, groups, ranges, runs
 
 BORDER_GAP = 3e-3
 """Largest distance of the borders of two parts that are one sheet, in diagonals of the larger border."""
@@ -75,11 +75,8 @@ def shared_edges(corners: NDArray[np.integer]) -> SharedEdges:
     forward = starts < ends
     keys = np.where(forward, starts * size + ends, ends * size + starts)
     keys[starts == ends] = -1
-    order = np.argsort(keys, kind="stable")
-    ordered = keys[order]
-    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]])[: len(ordered)])
-    counts = np.diff(np.append(first, len(ordered)))
-    counts[ordered[first] < 0] = 0
+    order, first, counts = runs(keys)
+    counts[keys[order[first]] < 0] = 0
     pairs = first[counts == 2]
     odd = np.flatnonzero((counts == 1) | (counts > 2))
     starts_of_odd = np.repeat(first[odd] - np.cumsum(counts[odd]) + counts[odd], counts[odd])
@@ -265,10 +262,8 @@ def edge_twins(corners: Int64Array) -> Int32Array:
     starts, ends = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
     size = int(corners.max(initial=0)) + 1
     keys = np.minimum(starts, ends) * size + np.maximum(starts, ends)
-    order = stable_order(keys)
-    ordered = keys[order]
-    first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1])[: len(keys)])
-    pairs = first[np.diff(np.append(first, len(keys))) == 2]
+    order, first, counts = runs(keys)
+    pairs = first[counts == 2]
     one, other = order[pairs], order[pairs + 1]
     against = (starts[one] == ends[other]) & (starts[one] != ends[one])
     one, other = one[against], other[against]
