@@ -55,9 +55,10 @@ class GBuffer:
 
     def use(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Restrict the next draws to these rows of the lower left part of this size."""
-        self._bind(self._framebuffer, width, height, part)
+        self.bind(self._framebuffer, width, height, part)
 
-    def _bind(self, framebuffer: moderngl.Framebuffer, width: int, height: int, part: Part) -> None:
+    def bind(self, framebuffer: moderngl.Framebuffer, width: int, height: int, part: Part) -> None:
+        """Restrict the next draws to these rows of a framebuffer with this depth."""
         framebuffer.viewport = (0, 0, width, height)
         framebuffer.scissor = scissor_of(Rectangle(0, 0, width, height).rows(part))
         framebuffer.use()
@@ -69,7 +70,7 @@ class GBuffer:
         rows = Rectangle(0, 0, width, height).rows(part)
         if self.clear_by_compute((self.position, self.normal, self.color), rows):
             if depth:
-                self._bind(self._depth_framebuffer, width, height, part)
+                self.bind(self._depth_framebuffer, width, height, part)
                 self._depth_framebuffer.clear(depth=1.0)
         else:
             self.use(width, height, part)  # first: it ends scissors of other passes
@@ -108,7 +109,7 @@ class GBuffer:
 
         Only users of the depth buffer need it: in the other targets such surface is complete.
         """
-        self._bind(self._depth_framebuffer, width, height, part)
+        self.bind(self._depth_framebuffer, width, height, part)
         self.position.use(0)
         set_uniform(self._depth_program, "g_position", 0)
         self._screen.render(vertices=3)

@@ -4,7 +4,6 @@ import moderngl
 
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.pixel_pass import scissor_of
 from decals.rendering.viewpoint import WHOLE, Part, Rectangle
 
 
@@ -35,19 +34,12 @@ class RestBuffer:
 
     def use(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Restrict the next draws to these rows of the lower left part of this size."""
-        self._use(self._framebuffer, width, height, part)
+        self._gbuffer.bind(self._framebuffer, width, height, part)
         self._gl.depth_func = "<="
 
     def use_with_surface(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Do the same for draws into the G-buffer and this buffer at once; see ``shaders/offset.frag``."""
-        self._use(self._with_surface, width, height, part)
-        self._gl.depth_func = "<"
-
-    def _use(self, framebuffer: moderngl.Framebuffer, width: int, height: int, part: Part) -> None:
-        framebuffer.viewport = (0, 0, width, height)
-        framebuffer.scissor = scissor_of(Rectangle(0, 0, width, height).rows(part))
-        framebuffer.use()
-        self._gl.enable_only(moderngl.DEPTH_TEST)
+        self._gbuffer.bind(self._with_surface, width, height, part)
 
     def bind_images(self, first_unit: int) -> None:
         """Bind the textures to image units, for compute shaders that write them."""
