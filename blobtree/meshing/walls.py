@@ -120,10 +120,10 @@ class _Samples:
     """Angles between the sides of the wall (n,)."""
 
     @staticmethod
-    def none(operand: Operand, device: str, rim: float = 0.0) -> "_Samples":
+    def none(operand: Operand, device: str) -> "_Samples":
         """Return no samples."""
         numbers, points = np.empty(0, np.float32), np.empty((0, 3), np.float32)
-        return _Samples(operand, operand.tape.on(device), rim, points, points, numbers, numbers)
+        return _Samples(operand, operand.tape.on(device), 0.0, points, points, numbers, numbers)
 
     def chosen(self, among: BoolArray | IndexArray) -> "_Samples":
         """Return some of the samples."""

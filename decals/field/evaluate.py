@@ -207,7 +207,7 @@ class ColorEvaluator:
 
     Parameters
     ----------
-    decals, images, index, walks, device
+    decals, images, index, walks
         See `evaluate`.
     rules : PictureRules
         Mapping, contact and stiffness.
@@ -221,9 +221,8 @@ class ColorEvaluator:
         *,
         index: DecalIndex | None = None,
         walks: ImageWalks | None = None,
-        device: Any = None,
     ) -> None:
-        self._decals, self._contact, self._device = decals, rules.contact, known_device(device)
+        self._decals, self._contact, self._device = decals, rules.contact, known_device(None)
         self._indexed = _indexed(decals, index, rules, walks, self._device)
         self._images = UploadedImages.of(images, self._device, heights=False, materials=False)
         self._images.check(image_count(rows_of(decals)))
