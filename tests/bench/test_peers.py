@@ -15,7 +15,7 @@ from tests.bench.implicit_uvs import log_maps as walk_maps
 from tests.bench.texture_sprites import Sprites, shown_by_all
 from tests.bench.tile_trees import TileTree
 from tests.decals.field import log_maps
-from tests.decals.shapes import torus
+from tests.decals.shapes import sheet_faces, torus
 from tests.vectors import unit
 
 TORUS = peer_errors.torus_mesh(rows=120)
@@ -32,9 +32,7 @@ def on_plane(count: int, seed: int) -> tuple[MeshDecals, Decals]:
     n = 21
     x, y = np.meshgrid(np.linspace(-2, 2, n), np.linspace(-2, 2, n), indexing="ij")
     vertices = np.stack([x, y, 0.2 * x], -1).reshape(-1, 3).astype(np.float32)
-    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
-    quads = np.stack([corner, corner + n, corner + n + 1, corner + 1], -1)
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32)
+    faces = sheet_faces(n, n).astype(np.int32)
     rng = np.random.default_rng(seed)
     points = rng.uniform(-1, 1, (count, 2))
     positions = np.column_stack([points, 0.2 * points[:, 0]])
@@ -138,9 +136,7 @@ def rolled_sheet(radius: float, *, side: int = 41) -> tuple[Any, Any, Any, Any]:
     angle = flat[:, 0] / radius
     normals = np.column_stack([np.sin(angle), np.zeros(len(flat)), np.cos(angle)])
     vertices = np.column_stack([radius * normals[:, 0], flat[:, 1], radius * (normals[:, 2] - 1)])
-    a = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).reshape(-1)
-    faces = np.concatenate([np.stack([a, a + side, a + side + 1], 1), np.stack([a, a + side + 1, a + 1], 1)])
-    return vertices, faces, normals, flat
+    return vertices, sheet_faces(side, side), normals, flat
 
 
 @pytest.mark.parametrize(("radius", "limit"), [(1e6, 1e-6), (0.2, 2e-3)])
@@ -158,9 +154,7 @@ def sheets(*offsets: tuple[float, float, bool]) -> tuple[Any, Any]:
     """Return level squares of side 4 with 3,200 triangles each: their x, height, and whether they face up."""
     n = 41
     x, y = np.meshgrid(np.linspace(-2, 2, n), np.linspace(-2, 2, n), indexing="ij")
-    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
-    quads = np.stack([corner, corner + n, corner + n + 1, corner + 1], -1)
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    faces = sheet_faces(n, n)
     vertices = [np.stack([x + shift, y, 0 * x + height], -1).reshape(-1, 3) for shift, height, _ in offsets]
     parts = [(faces if up else faces[:, ::-1]) + number * n * n for number, (_, _, up) in enumerate(offsets)]
     return np.concatenate(vertices).astype(np.float32), np.concatenate(parts).astype(np.int32)

@@ -30,6 +30,7 @@ from tests.blobtree.trees import triple
 from tests.decals.glsl.tapes import Model
 from tests.decals.shapes import View
 from tests.oracles.csg import deep_hits, signed_distance
+from tests.oracles.pixels import middle_rays
 
 TARGETS = {"csg_holes": "0", "csg_ray_holes": "0"}
 
@@ -127,16 +128,14 @@ def holes_of(
     `twin` has the same shape, of kinds that the oracle knows.
     """
     width, height = size
-    x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
-    rays = camera.rays(width, height)
-    directions = rays.directions(x, y).reshape(-1, 3)
+    origin, directions = middle_rays(camera, size)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    origins = np.broadcast_to(rays.origin, directions.shape)
+    origins = np.broadcast_to(origin, directions.shape)
     depth = DEPTH * float(np.linalg.norm(tree.support[1] - tree.support[0]))
     deep = deep_hits(twin or tree, origins, directions, depth)
     counted = _surrounded(np.isfinite(deep).reshape(height, width)).ravel()
     buffers = renderer.buffers(View((Model(tree),), camera), RenderOptions(size=size))
-    distances = np.linalg.norm(buffers.position.reshape(-1, 3) - rays.origin, axis=1)
+    distances = np.linalg.norm(buffers.position.reshape(-1, 3) - origin, axis=1)
     distances = np.where(buffers.object_id.ravel() < 0, np.inf, distances)
     traced = tree.raycast(origins, directions).distances
     late = (distances > deep + depth) & counted, (traced > deep + depth) & counted

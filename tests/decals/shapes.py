@@ -43,6 +43,14 @@ def grid(rows: int, columns: int) -> np.ndarray:
     return np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], 2).reshape(-1, 3).astype(np.int32)
 
 
+def sheet_faces(rows: int, columns: int) -> np.ndarray:
+    """Two triangles for each cell of a grid of points, which are numbered row by row."""
+    i, j = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
+    a = (i * columns + j).reshape(-1)
+    quads = np.stack([a, a + columns, a + columns + 1, a + 1], 1)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
 def torus(
     radius: float = 1.0,
     tube: float = 0.4,

@@ -522,12 +522,7 @@ def _least_ratio(q: Floats, cone: Cone) -> Floats:
         distance: Floats = np.linalg.norm(q - center, axis=1) / influence
         return distance
 
-    low, high = np.zeros(len(q)), np.ones(len(q))
-    for _ in range(42):
-        third = (high - low) / 3.0
-        falls = ratio(low + third) >= ratio(high - third)
-        low, high = np.where(falls, low + third, low), np.where(falls, high, high - third)
-    return np.minimum(ratio(0.5 * (low + high)), np.minimum(ratio(np.zeros(len(q))), ratio(np.ones(len(q)))))
+    return sharp.least(ratio, len(q), rounds=42)
 
 
 def _leaf_at(ratio: Floats, color: Any) -> Field:

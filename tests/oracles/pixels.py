@@ -1,4 +1,4 @@
-"""Averages of decals over pixels in float64: points of a plane, each with its own owner."""
+"""Pixels in float64: their rays, and averages of decals over points of a plane, each with its own owner."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,6 +9,14 @@ from numpy.typing import NDArray
 from tests.oracles.decals import colors_at
 
 Floats = NDArray[np.float64]
+
+
+def middle_rays(camera: Any, size: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Origin, and directions [h w, 3], of the rays through the middles of pixels, from the upper left one."""
+    width, height = size
+    x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
+    rays = camera.rays(width, height)
+    return rays.origin, rays.directions(x, y).reshape(-1, 3)
 
 
 def pixel_means(

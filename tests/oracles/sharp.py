@@ -1,5 +1,6 @@
 """Signed distances of solids with sharp edges, in float64 NumPy, below 0 inside."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -231,16 +232,22 @@ def drop(cone: Cone, q: Floats) -> Floats:
     """The distance of the hull of a ball and a point: the least over the balls of which it is the union."""
     ends, radii = np.array([cone.start, cone.end]), np.array([cone.radius, cone.end_radius])
 
-    def least(t: Floats) -> Floats:
+    def distance(t: Floats) -> Floats:
         centers = ends[0] + t[:, None] * (ends[1] - ends[0])
         return np.asarray(np.linalg.norm(q - centers, axis=1) - (radii[0] + t * (radii[1] - radii[0])))
 
-    low, high = np.zeros(len(q)), np.ones(len(q))
-    for _ in range(80):  # convex in t
+    return least(distance, len(q), rounds=80)
+
+
+def least(function: Callable[[Floats], Floats], count: int, *, rounds: int) -> Floats:
+    """The least value between 0 and 1 of functions that fall, then rise; by ternary search."""
+    low, high = np.zeros(count), np.ones(count)
+    for _ in range(rounds):
         third = (high - low) / 3.0
-        falls = least(low + third) >= least(high - third)
+        falls = function(low + third) >= function(high - third)
         low, high = np.where(falls, low + third, low), np.where(falls, high, high - third)
-    return np.minimum(least(0.5 * (low + high)), np.minimum(least(np.zeros(len(q))), least(np.ones(len(q)))))
+    ends = np.minimum(function(np.zeros(count)), function(np.ones(count)))
+    return np.minimum(function(0.5 * (low + high)), ends)
 
 
 def profile(node: Any) -> Floats:

@@ -118,17 +118,15 @@ def test_a_blob_that_leaves_the_box_keeps_the_grid() -> None:
 
 
 def test_nodes_above_an_edit_do_not_widen_it() -> None:
+    def below_an_offset(blobs: list[Point]) -> Node:
+        inner = Union((Sum(tuple(blobs[:150])), Sum(tuple(blobs[150:]))))
+        carved = inner.twist(20.0).scale((1.0, 1.2, 0.9)) - Segment((0, 0, 0), (1, 1, 1), radius=0.1)
+        return carved.offset(0.005)
+
     blobs = small_blobs()
-    inner = Union((Sum(tuple(blobs[:150])), Sum(tuple(blobs[150:]))))
-    tree = (inner.twist(20.0).scale((1.0, 1.2, 0.9)) - Segment((0, 0, 0), (1, 1, 1), radius=0.1)).offset(
-        0.005
-    )
-    polygonizer = Polygonizer(tree, cell_size=1.0 / 80.0)
+    polygonizer = Polygonizer(below_an_offset(blobs), cell_size=1.0 / 80.0)
     blobs[3] = replace(blobs[3], radius=0.05)
-    inner = Union((Sum(tuple(blobs[:150])), Sum(tuple(blobs[150:]))))
-    tree = (inner.twist(20.0).scale((1.0, 1.2, 0.9)) - Segment((0, 0, 0), (1, 1, 1), radius=0.1)).offset(
-        0.005
-    )
+    tree = below_an_offset(blobs)
     assert_same_bits(polygonizer.update(tree), polygonize(tree, cell_size=1.0 / 80.0))
     assert 0 < rebuilt_blocks(polygonizer) < 0.2 * len(polygonizer.dual_mesh.cells.leaves)
 

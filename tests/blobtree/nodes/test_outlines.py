@@ -21,6 +21,9 @@ FONT = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
 PIXELS = 600
 """Pixels of a unit of length."""
 
+FINE = 8 * PIXELS
+"""Pixels of a unit of length where each pixel of coverage has 64."""
+
 SQUARE = "M0 0H1V1H0Z"
 OVERLAPPING = '<svg><circle r="2"/><rect x="0" y="-.2" width="5" height=".4"/></svg>'
 TWICE = 2 * '<rect width="1" height="1"/>'
@@ -45,6 +48,11 @@ def assert_same_picture(outline: Outline, picture: Image.Image, top: float) -> N
     area = float(np.asarray(picture, np.float64).sum()) / 255.0
     assert found.sum() == pytest.approx(area, rel=3e-3)
     assert outline.area * PIXELS**2 == pytest.approx(area, rel=3e-3)
+
+
+def assert_same_coverage(outline: Outline, picture: Image.Image) -> None:
+    """An outline agrees with a fine picture of two units, from the upper left corner at (0, 0)."""
+    assert_same_picture(outline, picture.resize((2 * PIXELS, 2 * PIXELS), Image.Resampling.BOX), top=0.0)
 
 
 @pytest.mark.parametrize("letters", ["A", "g", "&", "8", "\u00e4", "%", "\u00e7", "\u0105", "YY"])
@@ -75,17 +83,15 @@ def test_a_drawing_is_that_of_a_rasteriser() -> None:
       <defs><circle r="1"/></defs>
       <path d="M1 1 A.3 .3 0 1 1 1.3 1.3 L1 1.3 Z m.1.1v.1h.1v-.1Z"/>
     </svg>"""
-    much = 8
-    picture = Image.new("L", (2 * PIXELS * much, 2 * PIXELS * much))
-    draw, one = ImageDraw.Draw(picture), PIXELS * much
+    picture = Image.new("L", (2 * FINE, 2 * FINE))
+    draw, one = ImageDraw.Draw(picture), FINE
     draw.rectangle((0.1 * one, 0.1 * one, 0.6 * one - 1, 0.4 * one - 1), fill=255)
     draw.ellipse((0.8 * one, 0.2 * one, 1.6 * one - 1, 0.6 * one - 1), fill=255)
     draw.polygon([(0.1 * one, 0.8 * one), (0.7 * one, 0.8 * one), (0.4 * one, 1.2 * one)], fill=255)
     draw.pieslice((one, 0.7 * one, 1.6 * one - 1, 1.3 * one - 1), 180, 90, fill=255)
     draw.rectangle((one, one, 1.3 * one - 1, 1.3 * one - 1), fill=255)
     draw.rectangle((1.1 * one, 1.1 * one, 1.2 * one - 1, 1.2 * one - 1), fill=0)
-    coverage = picture.resize((2 * PIXELS, 2 * PIXELS), Image.Resampling.BOX)
-    assert_same_picture(Outline.svg(drawing), coverage, top=0.0)
+    assert_same_coverage(Outline.svg(drawing), picture)
 
 
 def test_a_file_is_its_text(tmp_path: Path) -> None:
@@ -101,9 +107,8 @@ def test_shapes_that_overlap_are_those_of_a_rasteriser() -> None:
       <circle cx=".6" cy=".6" r=".4"/><rect x=".5" y=".5" width=".9" height=".3"/>
       <ellipse cx="1.4" cy=".7" rx=".3" ry=".5"/><path d="M.2 1.2 1 1.8V1.2L.2 1.8Z"/>
       <path fill-rule="evenodd" d="M1.2 1.2H1.8V1.8H1.2ZM1.4 1.4H2V1.6H1.4Z"/></svg>"""
-    much = 8
-    picture = Image.new("L", (2 * PIXELS * much, 2 * PIXELS * much))
-    draw, one = ImageDraw.Draw(picture), PIXELS * much
+    picture = Image.new("L", (2 * FINE, 2 * FINE))
+    draw, one = ImageDraw.Draw(picture), FINE
     draw.ellipse((0.2 * one, 0.2 * one, one - 1, one - 1), fill=255)
     draw.rectangle((0.5 * one, 0.5 * one, 1.4 * one - 1, 0.8 * one - 1), fill=255)
     draw.ellipse((1.1 * one, 0.2 * one, 1.7 * one - 1, 1.2 * one - 1), fill=255)
@@ -112,8 +117,7 @@ def test_shapes_that_overlap_are_those_of_a_rasteriser() -> None:
     draw.rectangle((1.2 * one, 1.2 * one, 1.8 * one - 1, 1.8 * one - 1), fill=255)
     draw.rectangle((1.4 * one, 1.4 * one, 2.0 * one - 1, 1.6 * one - 1), fill=255)
     draw.rectangle((1.4 * one, 1.4 * one, 1.8 * one - 1, 1.6 * one - 1), fill=0)
-    coverage = picture.resize((2 * PIXELS, 2 * PIXELS), Image.Resampling.BOX)
-    assert_same_picture(Outline.svg(drawing), coverage, top=0.0)
+    assert_same_coverage(Outline.svg(drawing), picture)
 
 
 @pytest.mark.parametrize("seed", range(12))

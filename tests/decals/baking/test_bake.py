@@ -188,11 +188,17 @@ def test_the_textured_meshes_look_like_the_picture_of_the_scene(baked: Path) -> 
     assert np.abs(shown - drawn[:, ::-1])[on_both].mean() > 25  # the measure tells other pictures apart
 
 
-def border_points(node: Any) -> Array:
-    """Texture coordinates along the borders of all charts."""
+def border_edges(node: Any) -> Array:
+    """Vertices (n, 2) of the edges of one face."""
     edges = np.concatenate([node.faces[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
     _, first, counts = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    ends = node.uv[edges[first[counts == 1]]]
+    borders: Array = edges[first[counts == 1]]
+    return borders
+
+
+def border_points(node: Any) -> Array:
+    """Texture coordinates along the borders of all charts."""
+    ends = node.uv[border_edges(node)]
     share = np.linspace(0, 1, 5)[:, None, None]
     points: Array = (ends[:, 0] * (1 - share) + ends[:, 1] * share).reshape(-1, 2)
     return points
@@ -221,9 +227,7 @@ def test_seams_show_no_colour_from_outside_their_chart(tmp_path: Path, samples: 
 
 def test_borders_of_charts_continue_the_decals(baked: Path) -> None:
     node = read_glb(baked)["ball"]
-    edges = np.concatenate([node.faces[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
-    _, first, counts = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    ends = edges[first[counts == 1]]
+    ends = border_edges(node)
     assert node.uv is not None
     assert node.texture is not None
     uv, points, normals = (values[ends].mean(axis=1) for values in (node.uv, node.vertices, node.normals))

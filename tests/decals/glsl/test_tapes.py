@@ -59,6 +59,7 @@ from tests.decals.glsl.tapes import (
 from tests.decals.shapes import View
 from tests.oracles import blends
 from tests.oracles import blobtree as oracle
+from tests.oracles.pixels import middle_rays
 
 TREES = random_trees(seed=31, count=24) + random_trees(seed=33, count=12, more=SOLIDS)
 VOLUME = from_sdf(lambda p: np.linalg.norm(p, axis=1) - 0.8, (-1, -1, -1), (1, 1, 1), spacing=0.2, width=0.4)
@@ -275,17 +276,15 @@ def assert_traced_alike(renderer: Renderer, tree: Node) -> None:
     width, height = 160, 120
     camera = Camera.framing(tree.support, direction=(0.3, 0.5, 1.0), aspect=width / height)
     buffers = renderer.buffers(View((Model(tree),), camera), RenderOptions(size=(width, height)))
-    x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
-    rays = camera.rays(width, height)
-    directions = rays.directions(x, y).reshape(-1, 3)
+    origin, directions = middle_rays(camera, (width, height))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    distance = trace(tree, np.tile(rays.origin, (len(directions), 1)), directions)
+    distance = trace(tree, np.tile(origin, (len(directions), 1)), directions)
     expected = np.isfinite(distance)
     seen = buffers.object_id.ravel() == 0
     assert expected.sum() > 500
     assert (seen != expected).sum() <= 1e-3 * expected.size
     both = seen & expected
-    depth = np.linalg.norm(buffers.position.reshape(-1, 3)[both] - rays.origin, axis=1)
+    depth = np.linalg.norm(buffers.position.reshape(-1, 3)[both] - origin, axis=1)
     size = float(np.linalg.norm(tree.support[1] - tree.support[0]))
     assert (np.abs(depth - distance[both]) > 1e-4 * size).mean() <= 2e-3
     points = buffers.position.reshape(-1, 3)[both]

@@ -18,6 +18,7 @@ from decals.scenes.meshes import as_polydata
 from decals.scenes.objects import as_object
 from decals.surfaces import BaseColor, BaseTexture, Wrap
 from tests.oracles.base_color import base_light, linear
+from tests.oracles.pixels import middle_rays
 from tests.oracles.raster import cast, edges
 
 SIZE = (64, 48)
@@ -51,9 +52,7 @@ def assert_picture(
 ) -> None:
     """Compare the picture of a mesh with a function of faces and barycentric weights."""
     width, height = SIZE
-    rays = camera().rays(width, height)
-    x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
-    _, face, weights = cast(item.vertices, item.faces, rays.origin, rays.directions(x, y).reshape(-1, 3))
+    _, face, weights = cast(item.vertices, item.faces, *middle_rays(camera(), SIZE))
     seen = (face >= 0) & ~edges(face.reshape(height, width)).reshape(-1)
     assert seen.sum() > 300
     right = light_of(face[seen], weights[seen])

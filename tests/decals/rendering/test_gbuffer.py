@@ -11,6 +11,7 @@ from decals.rendering import Renderer, RenderOptions
 from decals.surfaces.normals import vertex_normals
 from tests.decals.meshes import box
 from tests.decals.shapes import Shape, View, torus
+from tests.oracles.pixels import middle_rays
 from tests.oracles.raster import cast, edges
 
 SIZE = (80, 60)
@@ -25,20 +26,18 @@ def look(shapes: tuple[Shape, ...]) -> View:
 def oracle(camera: Camera, shapes: tuple[Shape, ...], size: tuple[int, int]) -> list[np.ndarray]:
     """Position, smooth normal and object of every pixel, row 0 at the top."""
     width, height = size
-    x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
-    rays = camera.rays(width, height)
-    directions = rays.directions(x, y).reshape(-1, 3)
+    origin, directions = middle_rays(camera, size)
     nearest = np.full(len(directions), np.inf)
     normal, object_id = np.zeros((len(directions), 3)), np.full(len(directions), -1)
     for number, shape in enumerate(shapes):
-        t, face, weights = cast(shape.vertices, shape.faces, rays.origin, directions)
+        t, face, weights = cast(shape.vertices, shape.faces, origin, directions)
         closer = t < nearest
         corners = vertex_normals(shape.vertices, shape.faces)[shape.faces[face[closer]]].astype(np.float64)
         smooth = np.einsum("nk,nki->ni", weights[closer], corners)
         normal[closer] = smooth / np.linalg.norm(smooth, axis=1, keepdims=True)
         nearest[closer], object_id[closer] = t[closer], number
     with np.errstate(invalid="ignore"):
-        position = np.where(np.isfinite(nearest)[:, None], rays.origin + nearest[:, None] * directions, 0)
+        position = np.where(np.isfinite(nearest)[:, None], origin + nearest[:, None] * directions, 0)
     nearest[np.isinf(nearest)] = 0
     return [
         array.reshape(height, width, *array.shape[1:]) for array in (position, normal, object_id, nearest)

@@ -17,6 +17,7 @@ from tests.blobtree.csg_trees import csg_primitive
 from tests.blobtree.custom_kinds import Brick
 from tests.decals.glsl.tapes import Model
 from tests.decals.shapes import View
+from tests.oracles.pixels import middle_rays
 
 SIZE = (48, 36)
 
@@ -34,10 +35,8 @@ def camera_of(tree: Node) -> Camera:
 def missing(tree: Node, renderer: Renderer) -> int:
     """Return the number of pixels that show no surface where a ray through them hits."""
     camera = camera_of(tree)
-    x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, SIZE[1] - np.arange(SIZE[1]) - 0.5)
-    rays = camera.rays(*SIZE)
-    directions = rays.directions(x, y).reshape(-1, 3)
-    hits = tree.raycast(np.broadcast_to(rays.origin, directions.shape), directions).hit
+    origin, directions = middle_rays(camera, SIZE)
+    hits = tree.raycast(np.broadcast_to(origin, directions.shape), directions).hit
     buffers = renderer.buffers(View((Model(tree),), camera), RenderOptions(size=SIZE))
     return int((hits & (buffers.object_id.ravel() < 0)).sum())
 

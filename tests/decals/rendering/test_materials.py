@@ -16,7 +16,7 @@ from decals.rendering import Light, Lighting, Renderer, RenderOptions
 from decals.scenes.material import MAP_NAMES
 from decals.scenes.script import write_script
 from tests.decals.rendering.pictures import scattered
-from tests.decals.shapes import torus
+from tests.decals.shapes import sheet_faces, torus
 from tests.oracles import materials as reference
 from tests.vectors import unit
 
@@ -32,10 +32,7 @@ def ball() -> MeshObject:
     """A sphere fine enough that interpolated normals are exact to 1e-4."""
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 129), np.linspace(0, np.pi, 65), indexing="ij")
     vertices = np.stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)], -1).reshape(-1, 3)
-    i, j = np.meshgrid(np.arange(128), np.arange(64), indexing="ij")
-    a = (65 * i + j).ravel()
-    faces = np.concatenate([np.stack([a, a + 1, a + 66], 1), np.stack([a, a + 66, a + 65], 1)])
-    return MeshObject("ball", vertices, faces, color=COLOR)
+    return MeshObject("ball", vertices, sheet_faces(129, 65)[:, ::-1], color=COLOR)
 
 
 def uniform(name: str, color: Any, tilt: tuple[int, int], emission: Any = (0, 0, 0), **levels: Any) -> Any:

@@ -18,7 +18,7 @@ from decals.scenes.pose import PosedScene
 from decals.scenes.script import write_script
 from decals.surfaces import MeshSurface
 from decals.surfaces.normals import vertex_normals
-from tests.decals.shapes import torus
+from tests.decals.shapes import sheet_faces, torus
 
 SIZE = (160, 120)
 OPTIONS = RenderOptions(size=SIZE, samples=1)
@@ -29,9 +29,7 @@ def sheet(*, side: int = 33) -> MeshObject:
     """Return a square of side 2 in the xy plane."""
     ticks = np.linspace(-1, 1, side)
     x, y = np.meshgrid(ticks, ticks, indexing="ij")
-    a = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).reshape(-1)
-    faces = np.concatenate([np.stack([a, a + side, a + side + 1], 1), np.stack([a, a + side + 1, a + 1], 1)])
-    return MeshObject("sheet", np.stack([x, y, 0 * x], -1).reshape(-1, 3), faces)
+    return MeshObject("sheet", np.stack([x, y, 0 * x], -1).reshape(-1, 3), sheet_faces(side, side))
 
 
 def renumbered() -> MeshObject:

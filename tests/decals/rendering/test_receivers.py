@@ -9,7 +9,7 @@ from decals import Camera, DecalImage, Decals, MeshObject, Scene
 from decals.index import DecalEditor
 from decals.rendering import Lighting, Renderer, RenderOptions
 from tests.decals.rendering.pictures import WHITE, in_layers, plain_colors, scattered
-from tests.decals.shapes import torus
+from tests.decals.shapes import sheet_faces, torus
 from tests.oracles.decals import colors_at, decals_at
 
 SIZE = (80, 60)
@@ -99,9 +99,7 @@ def test_edits_of_receivers_and_fades_are_drawn(renderer: Renderer) -> None:
 def bent_plate(thickness: float, bend: float) -> tuple[MeshObject, MeshObject]:
     """The near sheet and the far sheet of a plate in the plane z = 0, on an arc of a radius 1/bend."""
     u, v = np.meshgrid(np.linspace(-3, 3, 25), np.linspace(-3, 3, 9), indexing="ij")
-    i, j = np.meshgrid(np.arange(24), np.arange(8), indexing="ij")
-    a = (9 * i + j).ravel()
-    faces = np.concatenate([np.stack([a, a + 9, a + 10], 1), np.stack([a, a + 10, a + 1], 1)])
+    faces = sheet_faces(25, 9)
     sheets = []
     for height, order in ((0.0, 1), (-thickness, -1)):
         r = 1 / bend

@@ -15,6 +15,7 @@ from decals.rendering import viewpoint as tile
 from decals.scenes.objects import SceneObject
 from tests.decals.rendering.pictures import compare
 from tests.decals.shapes import torus
+from tests.oracles.pixels import middle_rays
 from tests.oracles.raster import edges
 
 SIZE = (96, 72)
@@ -42,17 +43,14 @@ def test_a_tree_lies_where_its_rays_hit(renderer: Renderer) -> None:
     scene = framed(TreeObject("blob", TREE))
     buffers = renderer.buffers(scene, RenderOptions(size=SIZE))
     width, height = SIZE
-    x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
-    rays = scene.camera.rays(width, height)
-    directions = rays.directions(x, y).reshape(-1, 3)
-    origins = np.broadcast_to(rays.origin, directions.shape)
-    distance = trace(TREE, origins, directions).reshape(height, width)
+    origin, directions = middle_rays(scene.camera, SIZE)
+    distance = trace(TREE, np.broadcast_to(origin, directions.shape), directions).reshape(height, width)
     hit = np.isfinite(distance)
     sure = ~edges(hit)
     np.testing.assert_array_equal((buffers.object_id == 0)[sure], hit[sure])
     seen = hit & sure
     unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    expected = rays.origin + distance[..., None] * unit.reshape(height, width, 3)
+    expected = origin + distance[..., None] * unit.reshape(height, width, 3)
     np.testing.assert_allclose(buffers.position[seen], expected[seen], atol=2e-4)
     assert np.abs(TREE(buffers.position[seen]) - 0.5).max() < 1e-3
     gradient = TREE.gradient(buffers.position[seen])

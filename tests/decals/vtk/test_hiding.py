@@ -79,15 +79,20 @@ def test_half_of_a_ball_behind_a_plane_is_picked_where_it_is_seen(plotter: Facto
     np.testing.assert_array_equal(shot(pl), seen)  # the picture is unchanged
 
 
+def assert_not_hidden(subplot: Any) -> None:
+    """Of what lies behind VTK's frame, nothing hides any of the pixels of ours."""
+    found = lying_behind(subplot)
+    for y, x in np.argwhere(found.object_id >= 0)[::11].tolist():
+        assert not subplot.hidden(x, 119 - y, found.position[y, x]), (x, y)
+
+
 @pytest.mark.parametrize("scale", [1.0, 0.6, 0.125])
 def test_nothing_of_ours_hides_us(pl: Plotter, scale: float) -> None:
     """At grazing angles and in coarse frames, where depths in a pixel differ much."""
     subplot = pl.decals.subplot
     subplot.draw_scale = scale
     shot(pl)
-    found = lying_behind(subplot)
-    for y, x in np.argwhere(found.object_id >= 0)[::11].tolist():
-        assert not subplot.hidden(x, 119 - y, found.position[y, x]), (x, y)
+    assert_not_hidden(subplot)
 
 
 def test_text_over_the_picture_hides_nothing(plotter: Factory) -> None:
@@ -141,9 +146,7 @@ def test_a_frame_that_is_ready_but_was_not_shown_hides_nothing(pl: Plotter) -> N
     shot(pl)
     while subplot.prepare(2, 10.0) is None:
         pass
-    found = lying_behind(subplot)
-    for y, x in np.argwhere(found.object_id >= 0)[::11].tolist():
-        assert not subplot.hidden(x, 119 - y, found.position[y, x]), (x, y)
+    assert_not_hidden(subplot)
 
 
 @given(st.integers(1, 60), st.integers(1, 200))
