@@ -10,14 +10,15 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
-from blobtree.validation import items, point_array
+from blobtree.validation import point_array
 from decals.errors import InvalidScattering
 from decals.scattering.boundary import Boundary
 from decals.scattering.projection import SurfaceProjection, spans_of
+from decals.surfaces.convert import as_surfaces
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.space_curve import curve_keys
-from decals.surfaces.surface import Surface, is_surface, vectors
+from decals.surfaces.surface import Surface, vectors
 from decals.validation import allowed_number, count_number, function_or_none, function_values, real_array
 
 AREA_SAMPLES = 16384
@@ -358,27 +359,6 @@ class Domain:
         """Derive the seed of one surface's samples for one purpose."""
         words = np.random.SeedSequence([self._seed, stream, index]).generate_state(2, np.uint64)
         return int(words[0])
-
-
-def listed(models: object) -> list[object]:
-    """Return one model or several as a list."""
-    several = list(models) if isinstance(models, list | tuple) else [models]
-    if all(is_surface(model) for model in several):
-        return several
-    from decals.surfaces.convert import is_model  # imports pyvista, which surfaces do not need
-
-    members = None if is_model(models) else items(models)
-    return [models] if members is None else list(members)
-
-
-def as_surfaces(models: object) -> tuple[Surface, ...]:
-    """Return one model or several as a tuple of surfaces, or raise `InvalidScattering`."""
-    several = listed(models)
-    if all(is_surface(model) for model in several):
-        return tuple(cast("list[Surface]", several))
-    from decals.surfaces.convert import as_surface
-
-    return tuple(as_surface(model, name="surfaces", error=InvalidScattering) for model in several)
 
 
 def on_nearest(surfaces: Sequence[Surface], points: Float32Array) -> OrientedPoints:

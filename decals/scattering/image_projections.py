@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Box, Float32Array, Float64Array
 from blobtree.validation import describe, finite_vector
 from decals.errors import InvalidScattering
-from decals.scattering.domain import as_surfaces
-from decals.surfaces.convert import Model, as_mesh_surface
+from decals.surfaces.convert import Model, as_mesh_surface, as_surfaces
 from decals.surfaces.surface import Surface
 from decals.validation import real_array
 

@@ -1,7 +1,7 @@
 """`scatter`: cover surfaces with decals in one call."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 import warp as wp
@@ -16,7 +16,7 @@ from decals.index.build_kernels import list_cells
 from decals.model import Decals
 from decals.options import Values
 from decals.scattering.appearance import Appearance, ImageChoice, ZonesOfModels
-from decals.scattering.domain import Density, Mask, as_surfaces, listed
+from decals.scattering.domain import Density, Mask
 from decals.scattering.jitter import Jitter
 from decals.scattering.neighbors import CLOSE_DISTANCE
 from decals.scattering.orientation import Direction
@@ -25,15 +25,13 @@ from decals.scattering.repulsion_kernels import repel
 from decals.scattering.search_kernels import sample_around
 from decals.scattering.sizing import Sizing
 from decals.scattering.step_kernels import propose_moves
+from decals.surfaces.convert import HasSurface, Model, as_surfaces, listed
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_kernels import closest_points
 from decals.surfaces.surface import Surface
 from decals.surfaces.tree_kernels import project_with_mesh
 from decals.validation import allowed_number, function_or_none
-
-if TYPE_CHECKING:  # pyvista takes long to import
-    from decals.surfaces.convert import HasSurface, Model
 
 SCATTER_KERNELS = (repel, sample_around, propose_moves, list_cells)
 """Kernels that scattering launches, for `load_together`, and those of an index of its decals."""
@@ -43,7 +41,7 @@ RELAXATION_SHARE = 0.8
 
 
 def scatter(
-    surfaces: "Surface | HasSurface | Model | Sequence[Surface | HasSurface | Model]",
+    surfaces: Surface | HasSurface | Model | Sequence[Surface | HasSurface | Model],
     *,
     count: Annotated[int | None, Values(1, 1000)] = None,
     spacing: Annotated[float | None, Values(unit="model units")] = None,

@@ -1,19 +1,15 @@
 """`seen_from_outside`: a mask of the points that can be seen from outside the models."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array
 from blobtree.validation import point_array
 from decals.errors import InvalidScattering
-from decals.scattering.domain import as_surfaces
+from decals.surfaces.convert import HasSurface, Model, as_surfaces
 from decals.surfaces.surface import Surface
 from decals.validation import count_number
-
-if TYPE_CHECKING:  # pyvista takes long to import
-    from decals.surfaces.convert import HasSurface, Model
 
 CLEARANCE = 1e-5
 """Distance from a point at which its rays start, over the size of the models: they miss its own face."""
@@ -23,7 +19,7 @@ MAX_DIRECTIONS = 100_000
 
 
 def seen_from_outside(
-    surfaces: "Surface | HasSurface | Model | Sequence[Surface | HasSurface | Model]",
+    surfaces: Surface | HasSurface | Model | Sequence[Surface | HasSurface | Model],
     *,
     directions: int = 256,
 ) -> Callable[[Float32Array], BoolArray]:

@@ -27,14 +27,12 @@ from decals.scattering.domain import (
     Mask,
     OrientedPoints,
     apportion,
-    as_surfaces,
     checked_values,
-    listed,
     on_nearest,
 )
 from decals.scattering.neighbors import FacingTree
 from decals.scattering.orientation import Direction, as_direction
-from decals.surfaces.convert import TREE_SUFFIXES
+from decals.surfaces.convert import TREE_SUFFIXES, as_surfaces, listed
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_file import block_triangles, read_parts

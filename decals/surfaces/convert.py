@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 import blobtree
 from blobtree import Mesh, Node
 from blobtree.files import no_file
-from blobtree.validation import describe, point_array
-from decals.errors import ImplicitDecalsError, InvalidMesh
+from blobtree.validation import describe, items, point_array
+from decals.errors import ImplicitDecalsError, InvalidMesh, InvalidScattering
 from decals.model import MAX_COORDINATE
 from decals.surfaces.base_color import BaseColor, checked_color, linear_colors
 from decals.surfaces.extras import READERS
@@ -137,6 +137,17 @@ def as_surface(
         return own
     shape = as_shape(model, name=name, error=error)
     return ImplicitSurface(shape) if isinstance(shape, Node) else MeshSurface(shape.vertices, shape.faces)
+
+
+def listed(models: object) -> list[object]:
+    """Return one model or several as a list."""
+    members = None if is_model(models) else items(models)
+    return [models] if members is None else list(members)
+
+
+def as_surfaces(models: object) -> tuple[Surface, ...]:
+    """Return one model or several as a tuple of surfaces, or raise `InvalidScattering`."""
+    return tuple(as_surface(model, name="surfaces", error=InvalidScattering) for model in listed(models))
 
 
 def as_mesh_surface(
