@@ -539,6 +539,10 @@ class Relaxation:
         """
         whole_number("seed", seed, 0, None, InvalidScattering)
         appearance = Appearance(sizing, factor, direction, images, weights, choice, jitter)
+        return self.decals_of(appearance, seed=seed, zones=zones)
+
+    def decals_of(self, appearance: Appearance, *, seed: int, zones: PlacedZones | None) -> Decals:
+        """Return a decal for each particle, with radii, tangents and images by these rules."""
         if self.count == 0:
             return Decals.empty()
         spacings = self.sizes_at(self.positions)

@@ -180,17 +180,7 @@ def scatter(
             lambda stage, fraction: report(stage, RELAXATION_SHARE + (1.0 - RELAXATION_SHARE) * fraction)
         ) as report_radii:
             report_radii("measuring radii", 0.0)
-            decals = relaxation.to_decals(
-                seed=seed,
-                sizing=sizing,
-                factor=factor,
-                direction=direction,
-                images=images,
-                weights=weights,
-                choice=choice,
-                jitter=jitter,
-                zones=placed,
-            )
+            decals = relaxation.decals_of(base, seed=seed, zones=placed)
             report_radii("measuring radii", 1.0)
     return decals
 
