@@ -8,12 +8,14 @@ Firefox 153 is driven by playwright 1.60, but not by 1.65. Touch is for Chromium
 """
 
 import asyncio
+import math
 import re
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -642,6 +644,8 @@ def cube_scene() -> Scene:
 PATHS = ((-0.1, 0.05), (0.08, -0.12)), ((0.02, -0.25), (0.2, 0.1)), ((-0.25, -0.05), (0.05, 0.1))
 """Starts and ends of drags, in the page from −1 to 1."""
 STEPS = 5
+INSIDE = 6
+"""Pixels by which a drag begins inside the image of its decal, at least."""
 
 
 async def dragged_alike(scene: Scene, browser: str, **options: Any) -> None:
@@ -655,6 +659,7 @@ async def dragged_alike(scene: Scene, browser: str, **options: Any) -> None:
         tools = PointerTools(actions, lambda x, y: (rays.origin, rays.directions(x, y)))
         for path in PATHS:
             (x, y), (to_x, to_y) = (((1 + a) * width / 2, (1 + b) * height / 2) for a, b in path)
+            x, y = on_a_decal(tools, x, y)
             await pull(page, (box["x"] + x, box["y"] + height - y), (to_x - x, y - to_y))
             number = (await state(page))["selected"]
             tools.press(x, y)
@@ -677,6 +682,18 @@ async def dragged_alike(scene: Scene, browser: str, **options: Any) -> None:
         assert still.max() > 0.5
         assert apart.max() < CLOSE
         assert max(turned) < TURNED
+
+
+def on_a_decal(tools: PointerTools, x: float, y: float) -> tuple[float, float]:
+    """Return the pixel nearest to one at which a decal shows, and some pixels around it the same decal."""
+    steps = sorted(product(range(-10, 11), repeat=2), key=lambda step: math.hypot(*step))
+    for right, up in steps:
+        middle = x + INSIDE * right, y + INSIDE * up
+        picks = [tools.at(middle[0] + a, middle[1] + b) for a, b in product((-INSIDE, 0, INSIDE), repeat=2)]
+        owners = {-1 if pick is None else pick.owner for pick in picks}
+        if len(owners) == 1 and owners != {-1}:
+            return middle
+    raise AssertionError(f"no decal near {x}, {y}")
 
 
 def same_surface(one: SceneObject, other: SceneObject) -> bool:
