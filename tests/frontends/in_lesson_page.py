@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.async_api import Browser, Locator, Page, async_playwright, expect
+from playwright.async_api import Browser, Error, Locator, Page, async_playwright, expect
 
 from decals.apps.lab.experiment import Scope
 from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons
@@ -84,6 +84,14 @@ def truths(lesson: Lesson, *formulas: str) -> list[float]:
     return [float(np.ravel(lesson.formulas[text].evaluate(scope))[0]) for text in formulas]
 
 
+async def ready(page: Page) -> None:
+    """Wait until the viewer of a page is ready, or raise an error with what the page shows in its place."""
+    try:
+        await page.wait_for_selector("#lesson[data-ready]", timeout=PATIENCE)
+    except Error as error:
+        raise AssertionError(await page.inner_text("#viewer")) from error
+
+
 async def settled(page: Page) -> None:
     """Wait until the page shows the values of its state."""
     await page.evaluate("() => new Promise(requestAnimationFrame)")
@@ -146,7 +154,7 @@ async def learned(browser: Browser, lesson: Lesson, attempts: list[Attempt], pat
     page.on("request", lambda request: requests.append(request.url))
     await page.add_init_script(ERRORS)
     await page.goto(path.as_uri())
-    await page.wait_for_function("document.getElementById('lesson').dataset.ready", timeout=PATIENCE)
+    await ready(page)
     first = await page.evaluate("performance.getEntriesByName('first frame')[0].startTime")
     await accessible(page)
     assert not await page.locator(".after:visible").count()
@@ -187,7 +195,7 @@ async def fitted(browser: Browser, lesson: Lesson, path: Path) -> None:
     for width, height in SIZES:
         page = await browser.new_page(viewport={"width": width, "height": height}, has_touch=True)
         await page.goto(path.as_uri())
-        await page.wait_for_function("document.getElementById('lesson').dataset.ready", timeout=PATIENCE)
+        await ready(page)
         assert await page.evaluate(CUT) == []
         await press(page, "Skip the guess")
         await settled(page)
@@ -262,7 +270,7 @@ async def typed(browser: Browser, path: Path, width: int, height: int) -> None:
     page = await browser.new_page(viewport={"width": width, "height": height})
     await page.add_init_script(ERRORS)
     await page.goto(path.as_uri())
-    await page.wait_for_function("document.getElementById('lesson').dataset.ready", timeout=PATIENCE)
+    await ready(page)
     await reach(page, "[name=guess]")
     await page.keyboard.type("2.2")
     await page.keyboard.press("Enter")
@@ -323,7 +331,7 @@ async def sketched(browser: Browser, path: Path, width: int, height: int) -> Non
     page = await browser.new_page(viewport={"width": width, "height": height}, has_touch=True)
     await page.add_init_script(ERRORS)
     await page.goto(path.as_uri())
-    await page.wait_for_function("document.getElementById('lesson').dataset.ready", timeout=PATIENCE)
+    await ready(page)
     finger = is_chromium(page) and width < SIZE["width"]
     await trace(page, page.locator(".pad circle").first, finger=finger)
     await page.locator("[name=guess]").fill("0.5")
@@ -359,7 +367,7 @@ async def taught(room: Classroom, address: str) -> None:
             page = await browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True)
             await page.add_init_script(ERRORS)
             await page.goto(f"{students(address)}/{room.token}/9-packing.html")
-            await page.wait_for_selector("#lesson[data-ready]", timeout=PATIENCE)
+            await ready(page)
             await page.locator("[name=guess]").fill(str(10 + number))
             await page.get_by_role("button", name="See", exact=True).tap()
             await page.wait_for_selector("#lesson[data-shown]", timeout=PATIENCE)
