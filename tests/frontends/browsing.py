@@ -203,5 +203,7 @@ async def violations(page: Page) -> list[dict[str, Any]]:
     assert found is not None, "pip install axe-playwright-python"
     assert found.origin is not None
     await page.evaluate((Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
-    listed: list[dict[str, Any]] = await page.evaluate("axe.run().then(result => result.violations)")
+    listed: list[dict[str, Any]] = await page.evaluate(
+        "axe.run({ resultTypes: ['violations'] }).then(result => result.violations)"
+    )
     return listed

@@ -738,6 +738,54 @@ async def accessible(browser: Page) -> None:
     assert not serious, serious
 
 
+async def access() -> None:
+    """All menus, panels and dialogs of the sandbox are accessible, light and dark, and on small screens."""
+    scene = decals.cover(BLOB, count=40, images=["tile", "scale"])
+    async with sandboxed(scene, Path(tempfile.mkdtemp()) / "scene.json") as (browser, _, window):
+        state, escape = window.actions.state, partial(browser.keyboard.press, "Escape")
+        await browser.emulate_media(reduced_motion="reduce")
+        button = partial(browser.get_by_role, "button", exact=True)
+        await shows(browser, window.plotter)
+        for name in ("Scattering", "Drawing"):
+            await button(name=name).click()
+        for _ in ("light", "dark"):
+            for name in ("File", "View", "Add", "Modify", "Combine", "Actions"):
+                await button(name=name).click()
+                await browser.locator(".v-overlay--active").first.wait_for()
+                await accessible(browser)
+                await escape()
+                await browser.locator(".v-overlay--active").first.wait_for(state="detached")
+            await accessible(browser)
+            await button(name="light or dark (Alt + L)").click()
+        await browser.get_by_text("Point").nth(1).click()
+        await browser.get_by_role("heading", name="Point", exact=True).wait_for()
+        await accessible(browser)
+        await browser.get_by_text("Point").nth(1).click(button="right")
+        await browser.get_by_text("Isolate, or show all", exact=True).wait_for()
+        await accessible(browser)
+        await escape()
+        await button(name="tile").click()
+        await browser.get_by_role("heading", name="Image tile", exact=True).wait_for()
+        await accessible(browser)
+        number, at = next(Driver(window).visible())
+        await drag(browser, window.plotter, at)
+        await until(lambda: state.selection == (number,))
+        await button(name="more about interaction").click()
+        await browser.locator(".word").wait_for()
+        await accessible(browser)
+        await escape()
+        await browser.locator(".word").wait_for(state="hidden")
+        await browser.get_by_label("scatter brush").click()
+        await browser.get_by_role("heading", name="scatter brush", exact=True).wait_for()
+        for width, height in ((1280, 800), (820, 1180), (390, 844)):
+            await browser.set_viewport_size({"width": width, "height": height})
+            await until(lambda width=width: window.plotter.window_size[0] <= width)  # type: ignore[misc]
+            await accessible(browser)
+        for side in ("left", "right"):
+            await browser.get_by_label(f"{side} panel").first.click()
+            await accessible(browser)
+
+
 async def sandbox_start(picture: str | None = None) -> None:
     """From the start page a user opens a sample, brushes and clicks decals, drops an image and saves."""
     folder = Path(tempfile.mkdtemp())
@@ -1237,8 +1285,7 @@ async def lab(picture: str | None = None) -> None:
             assert box is not None
             assert box["y"] + box["height"] <= 800  # in sight below text, question and verdict
             assert await browser.evaluate(SCROLLED_TWICE) == []
-            if number == 0:
-                await accessible(browser)
+            await accessible(browser)
             if picture is not None and number == 1:
                 await shows(browser, window.plotter)
                 await save_picture(browser, Path(picture))
@@ -1258,6 +1305,7 @@ async def lab(picture: str | None = None) -> None:
         lines = browser.locator("pre.script")
         await lines.get_by_text("decals.load_scene").wait_for()
         assert (await lines.inner_text()).rstrip() == lab_page.lab.script().rstrip()
+        await accessible(browser)
         await browser.keyboard.press("Escape")
         await lines.wait_for(state="hidden")
         curve = browser.locator("path[data-symbol='g']")
@@ -1524,6 +1572,7 @@ def main() -> None:
         "fields": fields,
         "filled": filled,
         "copies": copies,
+        "access": access,
         "zone": zone,
         "snowman": snowman,
         "shared": shared,

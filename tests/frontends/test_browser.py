@@ -58,6 +58,7 @@ def require(*modules: str) -> None:
         "fields",
         "filled",
         "copies",
+        "access",
         "zone",
         "snowman",
         "shared",
