@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Int64Array
 from decals.sorting import distinct_numbers, runs
-from decals.surfaces.topology import components, first_copies, parts_of, welded
+from decals.surfaces.topology import components, edge_keys, first_copies, parts_of, welded
 from decals.surfaces.windings import Triangles
 
 MIN_HEIGHT = 1e-7
@@ -154,9 +154,7 @@ class _Edges:
     def __init__(self, corners: Int64Array) -> None:
         starts, ends = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
         forward = starts < ends
-        size = int(corners.max(initial=0)) + 1
-        keys = np.minimum(starts, ends) * size + np.maximum(starts, ends)
-        order, first, counts = runs(keys)
+        order, first, counts = runs(edge_keys(corners).reshape(-1))
         self.border_faces: Int64Array = order[first[counts == 1]] // 3
         self.branching = int((counts > 2).sum())
         pairs = first[counts == 2]

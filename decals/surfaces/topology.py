@@ -246,6 +246,14 @@ def _turned(edges: SharedEdges, count: int) -> BoolArray:
     return turned
 
 
+def edge_keys(corners: Int64Array) -> Int64Array:
+    """Return a number for the edge of each side of faces, ``int64[m, 3]``; both faces at it have the same."""
+    ends = np.roll(corners, -1, axis=1)
+    size = int(corners.max(initial=0)) + 1
+    keys: Int64Array = np.minimum(corners, ends) * size + np.maximum(corners, ends)
+    return keys
+
+
 def edge_twins(corners: Int64Array) -> Int32Array:
     """Return for side k of face f, from corner k to the next, the same side ``3 f' + k'`` of the neighbour.
 
@@ -260,13 +268,11 @@ def edge_twins(corners: Int64Array) -> Int32Array:
         −1 where a side has no neighbour, or more than one.
     """
     starts, ends = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
-    size = int(corners.max(initial=0)) + 1
-    keys = np.minimum(starts, ends) * size + np.maximum(starts, ends)
-    order, first, counts = runs(keys)
+    order, first, counts = runs(edge_keys(corners).reshape(-1))
     pairs = first[counts == 2]
     one, other = order[pairs], order[pairs + 1]
     against = (starts[one] == ends[other]) & (starts[one] != ends[one])
     one, other = one[against], other[against]
-    twins = np.full(len(keys), -1, np.int32)
+    twins = np.full(len(starts), -1, np.int32)
     twins[one], twins[other] = other, one
     return twins

@@ -12,6 +12,7 @@ from decals.surfaces.topology import (
     SharedEdges,
     components,
     consistent_winding,
+    edge_keys,
     first_copies,
     shared_edges,
     welded,
@@ -242,7 +243,7 @@ def _coincident(corners: Int64Array, rows: Int64Array) -> tuple[Int64Array, Int6
         return leaders, np.zeros((0, 2), np.int64)
     order = np.argsort(which, kind="stable")
     pairs = rows[order[(np.cumsum(counts) - counts)[doubled][:, None] + np.arange(2)]]
-    keys = _edge_keys(corners, corners.max() + 1)
+    keys = edge_keys(corners)
     single, number = np.unique(keys[rows[counts[which] == 1]], return_counts=True)
     at = np.searchsorted(single, keys[pairs[:, 0]])
     present = np.append(single, -1)[np.minimum(at, len(single))] == keys[pairs[:, 0]]
@@ -253,13 +254,6 @@ def _coincident(corners: Int64Array, rows: Int64Array) -> tuple[Int64Array, Int6
     walls = pairs[(joined & ~odd)[parts]]
     leaders[np.isin(rows, walls)] = rows[np.isin(rows, walls)]
     return leaders, walls
-
-
-def _edge_keys(corners: Int64Array, size: int) -> Int64Array:
-    """Return a number for the edge of each side of faces, ``int64[m, 3]``."""
-    ends = np.roll(corners, -1, axis=1)
-    keys: Int64Array = np.minimum(corners, ends) * size + np.maximum(corners, ends)
-    return keys
 
 
 def _same_walls(wound: Int64Array, walls: Int64Array) -> Int64Array:

@@ -8,16 +8,14 @@ from decals.surfaces import MeshSurface
 from tests.decals.distortion import random_points
 from tests.decals.fault_models import Arrays, joined
 from tests.decals.meshes import icosphere
+from tests.decals.shapes import sheet_faces
 
 
 def plate(x: float = 0.0, z: float = 0.0, cells: int = 8) -> Arrays:
     """A unit square that faces up."""
     i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
     vertices = np.stack([x + i / cells, j / cells, np.full(i.shape, z)], -1).reshape(-1, 3)
-    a = (i[:-1, :-1] * (cells + 1) + j[:-1, :-1]).ravel()
-    corners = a, a + cells + 1, a + cells + 2, a + 1
-    faces = [np.stack([corners[0], corners[k], corners[k + 1]], -1) for k in (1, 2)]
-    return vertices, np.concatenate(faces)
+    return vertices, sheet_faces(cells + 1, cells + 1)
 
 
 @pytest.mark.parametrize(("gap", "sheets"), [(0.0, 1), (0.004, 1), (0.05, 2)])
