@@ -197,13 +197,12 @@ async def trace(page: Page, circle: Locator, *, finger: bool = False) -> None:
     await page.mouse.up()
 
 
-async def violations(page: Page) -> list[dict[str, Any]]:
-    """What axe-core finds in a page; axe-playwright-python brings its script."""
+async def violations(page: Page, part: str = "html") -> list[dict[str, Any]]:
+    """What axe-core finds in a part of a page; axe-playwright-python brings its script."""
     found = find_spec("axe_playwright_python")
     assert found is not None, "pip install axe-playwright-python"
     assert found.origin is not None
     await page.evaluate((Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
-    listed: list[dict[str, Any]] = await page.evaluate(
-        "axe.run({ resultTypes: ['violations'] }).then(result => result.violations)"
-    )
+    run = "part => axe.run(part, { resultTypes: ['violations'] }).then(result => result.violations)"
+    listed: list[dict[str, Any]] = await page.evaluate(run, part)
     return listed

@@ -728,11 +728,11 @@ def around(at: tuple[int, int], reach: int) -> list[tuple[int, int]]:
     return [(at[0] + x, at[1] + y) for x in steps for y in steps]
 
 
-async def accessible(browser: Page) -> None:
-    """Make sure that axe-core finds nothing serious in the page."""
+async def accessible(browser: Page, part: str = "html") -> None:
+    """Make sure that axe-core finds nothing serious in the page, or in a part of it."""
     serious = [
         (one["id"], one["impact"], [node["html"][:160] for node in one["nodes"]][:4])
-        for one in await violations(browser)
+        for one in await violations(browser, part)
         if one["impact"] in ("serious", "critical")
     ]
     assert not serious, serious
@@ -1010,13 +1010,13 @@ async def panels(picture: str | None = None) -> None:
         await row("Torus").wait_for()
         sandbox_page.sandbox.unwrap()  # is refused, in red
         await browser.locator(".refused").wait_for()
-        await accessible(browser)
+        await accessible(browser, ".refused")
         await browser.keyboard.press("Alt+l")
         await browser.locator(".v-theme--dark").first.wait_for()
         await browser.get_by_label("light or dark").click()
         await browser.locator(".v-theme--dark").first.wait_for(state="detached")
         await browser.get_by_label("light or dark").click()
-        await accessible(browser)
+        await accessible(browser, ".refused")
         await browser.get_by_text("Start", exact=True).click()
         await until(lambda: digest(document) == state)
         assert sandbox_page.sandbox.values()["done"] == []
