@@ -1,6 +1,7 @@
 """Normals of decals: means around centres near creases, and turns at lips and behind thin walls."""
 
 from collections.abc import Callable
+from copy import copy
 from typing import TypeAlias
 
 import numpy as np
@@ -139,8 +140,6 @@ class DecalNormals:
         Points spread evenly over the area to cover.
     with_normals
         Gives centres the normals of decals, before some turn.
-    tolerance
-        Distance, in spacings, up to which a decal that moves keeps the normal that it has before it turns.
     """
 
     def __init__(
@@ -149,21 +148,27 @@ class DecalNormals:
         spacings: Float32Array,
         samples: OrientedPoints,
         with_normals: WithNormals,
-        tolerance: float = 0.0,
     ) -> None:
         self._spacings, self._samples, self._with_normals = spacings, samples, with_normals
-        self._tolerance = tolerance * spacings.astype(np.float64)
+        self._tolerance = 0.0
         self._decals = with_normals(centers, spacings)
         self._nearest = NearestFacing(samples.positions, samples.normals)
 
-    def part(self, centers: OrientedPoints, rows: Int64Array, samples: OrientedPoints) -> "DecalNormals":
-        """Return one for some of the decals and the samples around them, with the tolerance `SMALL_MOVE`."""
-        return DecalNormals(centers, self._spacings[rows], samples, self._with_normals, SMALL_MOVE)
+    def part(self, rows: Int64Array, samples: OrientedPoints) -> "DecalNormals":
+        """Return one for some of the decals and the samples around them.
+
+        It keeps the normals of decals that move at most `SMALL_MOVE` spacings.
+        """
+        other = copy(self)
+        other._spacings, other._samples, other._decals = self._spacings[rows], samples, self._decals[rows]
+        other._nearest = NearestFacing(samples.positions, samples.normals)
+        other._tolerance = SMALL_MOVE
+        return other
 
     def of(self, centers: OrientedPoints) -> OrientedPoints:
         """Return the decals at centres, turned as `turned_normals` says."""
         distances = np.linalg.norm(centers.positions - self._decals.positions, axis=1)
-        moved = np.flatnonzero(distances > self._tolerance)
+        moved = np.flatnonzero(distances > self._tolerance * self._spacings)
         self._decals = self._decals.replaced(moved, self._with_normals(centers[moved], self._spacings[moved]))
         radii = EXPECTED_RADIUS * self._spacings.astype(np.float64)
         bent = OrientedPoints(centers.positions, self._decals.normals, centers.surface_ids)

@@ -110,22 +110,21 @@ def cell_middles(
 
     A cell is the samples that a point owns; without any, its middle is the point.
     """
-    middles = points.positions[rows].astype(np.float64)
+    middles = points.positions.astype(np.float64)
+    of_row = np.zeros(len(points), np.bool_)
+    of_row[rows] = True
     order = np.argsort(owners, kind="stable")
-    starts = np.searchsorted(owners[order], rows)
-    ends = np.searchsorted(owners[order], rows, side="right")
-    for k in np.flatnonzero(starts < ends):
-        middles[k] = _center(samples[order[starts[k] : ends[k]]].astype(np.float64), middles[k])
-    return middles
-
-
-def _center(points: Float64Array, start: Float64Array) -> Float64Array:
-    """Return about the centre of the least ball around points."""
-    center = start.copy()
-    for step in range(1, ENCLOSING_STEPS):
-        far = points[np.einsum("ni,ni->n", points - center, points - center).argmax()]
-        center += (far - center) / (step + 1)
-    return center
+    order = order[(owners[order] >= 0) & of_row[owners[order]]]
+    found, starts, counts = np.unique(owners[order], return_index=True, return_counts=True)
+    own, groups = samples[order].astype(np.float64), np.repeat(np.arange(len(found)), counts)
+    farthest = np.empty(len(found), np.int64)
+    for step in range(1, ENCLOSING_STEPS if len(found) else 1):
+        offsets = own - middles[found][groups]
+        lengths = np.einsum("ni,ni->n", offsets, offsets)
+        far = np.flatnonzero(lengths >= np.maximum.reduceat(lengths, starts)[groups])
+        farthest[groups[far]] = far
+        middles[found] += (own[farthest] - middles[found]) / (step + 1)
+    return middles[rows]
 
 
 def _far_enough(

@@ -35,14 +35,15 @@ MOVES = 1.3
 MAX_EXCESS = 0.35
 """Largest excess that counts, as a share of the largest good radius: no arrangement reaches some points."""
 
-PHASES = (1.0, 0.7, 0.4)
-"""Share of each move that is made, in the rounds of each phase."""
-
-ROUNDS = 18
-"""Largest number of arrangements that are looked at in each phase."""
+PHASES = ((1.0, 12, False), (0.7, 8, True), (0.4, 6, True))
+"""Share of each move that is made in the rounds of each phase, number of these rounds, and True if no move may
+bring two decals nearer than `MIN_DISTANCE`. In the first phase, decals may pass through such arrangements."""
 
 MAX_MOVE, LEAST_MOVE = 0.2, 1e-3
 """Longest and shortest move of a round, in spacings."""
+
+UNDONE = 3
+"""Largest number of times that moves of a round are undone: decals that go back may be near to others."""
 
 ACTIVE, LOOKED_AT = 5.0, 8.0
 """Distances of a faulty decal, in spacings, up to which decals move, and up to which they are looked at."""
@@ -140,10 +141,10 @@ def rearranged(
         normals,
     )
     best = task.arrangement(centers, decals)
-    for share in PHASES:
+    for phase in PHASES:
         if not best.faults.any():
             break
-        moved = task.moved(best, share)
+        moved = task.moved(best, *phase)
         found = task.arrangement(moved, with_sheets(normals.of(moved)))
         best = found if found.faults.sum() < best.faults.sum() else best
     return best.decals
@@ -180,20 +181,22 @@ class _Task:
         np.add.at(faults, pairs, (0.5 * lacks**2 + overlap)[:, None])
         return _Arrangement(centers, decals, radii, owners, pairs, distances, faults)
 
-    def moved(self, start: _Arrangement, share: float) -> OrientedPoints:
-        """Return the centres after rounds of moves near faulty decals, of which a share is made."""
+    def moved(self, start: _Arrangement, share: float, rounds: int, guarded: bool) -> OrientedPoints:
+        """Return the centres after the rounds of a phase near faulty decals; see `PHASES`."""
         rows = np.flatnonzero(_near(start.centers.positions, start.faults > 0.0, LOOKED_AT * self.spacing))
         active = _near(start.centers.positions, start.faults > 0.0, ACTIVE * self.spacing)[rows]
         part, centers = self._part(start, rows), start.centers[rows]
         heights = None if start.decals.heights is None else start.decals.heights[rows]
-        rounds = list[_Arrangement]()
-        for _ in range(ROUNDS):
+        found = list[_Arrangement]()
+        for _ in range(rounds):
             check_cancelled("moving decals apart")
-            rounds.append(part.arrangement(centers, replace(part.normals.of(centers), heights=heights)))
-            if not rounds[-1].faults.any():
+            found.append(part.arrangement(centers, replace(part.normals.of(centers), heights=heights)))
+            if not found[-1].faults.any():
                 break
-            centers = part._after_moves(rounds[-1], active, share)
-        return start.centers.replaced(rows, _best_of_groups(rounds, LINK * self.spacing))
+            centers = part._after_moves(found[-1], active, share)
+            if guarded:
+                centers = part._without_overlaps(found[-1], centers)
+        return start.centers.replaced(rows, _best_of_groups(found, LINK * self.spacing))
 
     def _part(self, start: _Arrangement, rows: Int64Array) -> "_Task":
         """Return the task for some decals and the samples nearest to them."""
@@ -205,7 +208,7 @@ class _Task:
             movable=self.movable[rows],
             samples=samples,
             nearest=NearestFacing(samples.positions, samples.normals),
-            normals=self.normals.part(start.centers[rows], rows, samples),
+            normals=self.normals.part(rows, samples),
         )
 
     def _after_moves(self, last: _Arrangement, active: BoolArray, share: float) -> OrientedPoints:
@@ -229,6 +232,17 @@ class _Task:
         after, allowed = self.domain.project(replace(centers[rows], positions=targets))
         kept = np.flatnonzero(allowed)
         return centers.replaced(rows[kept], after[kept])
+
+    def _without_overlaps(self, last: _Arrangement, centers: OrientedPoints) -> OrientedPoints:
+        """Return centres of which those are back at their last places that came too near to others."""
+        for _ in range(UNDONE):
+            pairs, distances = _near_pairs(centers, last.decals.heights, MIN_DISTANCE * self.spacing)
+            first, second = (last.centers.positions[rows].astype(np.float64) for rows in pairs.T)
+            back = np.unique(pairs[distances < np.linalg.norm(first - second, axis=1)])
+            if len(back) == 0:
+                break
+            centers = centers.replaced(back, last.centers[back])
+        return centers
 
 
 def _best_of_groups(rounds: list[_Arrangement], reach: float) -> OrientedPoints:
