@@ -35,15 +35,15 @@ MOVES = 1.3
 MAX_EXCESS = 0.35
 """Largest excess that counts, as a share of the largest good radius: no arrangement reaches some points."""
 
-PHASES = ((1.0, 12, False), (0.7, 8, True), (0.4, 6, True))
-"""Share of each move that is made in the rounds of each phase, number of these rounds, and True if no move may
-bring two decals nearer than `MIN_DISTANCE`. In the first phase, decals may pass through such arrangements."""
+PHASES = ((1.0, 18, False), (0.7, 12, True), (0.4, 8, True))
+"""Share of each move that is made in the rounds of each phase, number of these rounds, and True if moves that
+bring two decals nearer than `GUARD` are undone. Without that, decals may pass through such arrangements."""
+
+GUARD = 0.75
+"""Distance of two decals, in spacings, below which guarded moves do not bring them."""
 
 MAX_MOVE, LEAST_MOVE = 0.2, 1e-3
 """Longest and shortest move of a round, in spacings."""
-
-UNDONE = 3
-"""Largest number of times that moves of a round are undone: decals that go back may be near to others."""
 
 ACTIVE, LOOKED_AT = 5.0, 8.0
 """Distances of a faulty decal, in spacings, up to which decals move, and up to which they are looked at."""
@@ -193,9 +193,8 @@ class _Task:
             found.append(part.arrangement(centers, replace(part.normals.of(centers), heights=heights)))
             if not found[-1].faults.any():
                 break
-            centers = part._after_moves(found[-1], active, share)
-            if guarded:
-                centers = part._without_overlaps(found[-1], centers)
+            after = part._after_moves(found[-1], active, share)
+            centers = _kept_apart(centers, after, heights, GUARD * self.spacing) if guarded else after
         return start.centers.replaced(rows, _best_of_groups(found, LINK * self.spacing))
 
     def _part(self, start: _Arrangement, rows: Int64Array) -> "_Task":
@@ -233,16 +232,19 @@ class _Task:
         kept = np.flatnonzero(allowed)
         return centers.replaced(rows[kept], after[kept])
 
-    def _without_overlaps(self, last: _Arrangement, centers: OrientedPoints) -> OrientedPoints:
-        """Return centres of which those are back at their last places that came too near to others."""
-        for _ in range(UNDONE):
-            pairs, distances = _near_pairs(centers, last.decals.heights, MIN_DISTANCE * self.spacing)
-            first, second = (last.centers.positions[rows].astype(np.float64) for rows in pairs.T)
-            back = np.unique(pairs[distances < np.linalg.norm(first - second, axis=1)])
-            if len(back) == 0:
-                break
-            centers = centers.replaced(back, last.centers[back])
-        return centers
+
+def _kept_apart(
+    before: OrientedPoints, after: OrientedPoints, heights: Float64Array | None, least: float
+) -> OrientedPoints:
+    """Return centres after moves, but undo moves that bring two nearer than before and than the least."""
+    while True:
+        pairs, distances = _near_pairs(after, heights, least)
+        first, second = (before.positions[rows].astype(np.float64) for rows in pairs.T)
+        back = np.unique(pairs[distances < np.linalg.norm(first - second, axis=1)])
+        back = back[(after.positions[back] != before.positions[back]).any(axis=1)]
+        if len(back) == 0:
+            return after
+        after = after.replaced(back, before[back])
 
 
 def _best_of_groups(rounds: list[_Arrangement], reach: float) -> OrientedPoints:

@@ -11,7 +11,7 @@ from decals.model import FACING_LIMIT
 from decals.scattering.decal_normals import DecalNormals
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.neighbors import NearestFacing
-from decals.scattering.rearrangement import ACTIVE, LARGEST, _near_pairs, rearranged
+from decals.scattering.rearrangement import ACTIVE, LARGEST, _kept_apart, _near_pairs, rearranged
 from tests.decals.family_models import model_of
 from tests.decals.meshes import sphere
 
@@ -147,3 +147,18 @@ def test_decals_of_hard_models_are_even(name: str) -> None:
     radii = scene.decals.radii
     assert radii.max() < 1.51 * np.median(radii)
     assert scene.measure(samples=20_000).rho > 0.85
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_guarded_moves_bring_no_two_decals_too_near(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    before = on_ball(on_ball(rng.normal(size=(COUNT, 3))).normals)
+    after = on_ball(on_ball(before.positions + 0.2 * rng.normal(size=(COUNT, 3))).normals)
+    found = _kept_apart(before, after, None, 0.05)
+    facing = np.triu(before.normals @ before.normals.T > FACING_LIMIT, 1)
+    facing &= found.normals @ found.normals.T > FACING_LIMIT
+    earlier, now = (cdist(points.positions, points.positions) for points in (before, found))
+    assert not (facing & (now < 0.05) & (now < earlier - 1e-6)).any()
+    kept = (found.positions == after.positions).all(axis=1)
+    assert 0.3 < kept.mean() < 1.0
+    assert (found.positions[~kept] == before.positions[~kept]).all()
