@@ -5,6 +5,7 @@ import numpy as np
 from blobtree._typing import BoolArray, Float64Array, Int64Array
 from blobtree.progress import check_cancelled
 from decals.scattering.domain import Domain, OrientedPoints
+from decals.scattering.gap_filling import cell_middles
 from decals.scattering.neighbors import FacingTree, NearestFacing
 from decals.surfaces.surface import row_blocks
 
@@ -158,19 +159,8 @@ def _centered(
     domain: Domain, centers: OrientedPoints, samples: OrientedPoints, owners: Int64Array
 ) -> OrientedPoints:
     """Return centres moved to those of the least balls around their samples, on the surface."""
-    order = np.argsort(owners, kind="stable")
-    order = order[owners[order] >= 0]
-    found, starts = np.unique(owners[order], return_index=True)
-    points = samples.positions[order].astype(np.float64)
-    groups = np.repeat(np.arange(len(found)), np.diff(np.append(starts, len(order))))
-    middles = centers.positions[found].astype(np.float64)
-    for step in range(1, ENCLOSING_STEPS):
-        offsets = points - middles[groups]
-        lengths = np.einsum("ni,ni->n", offsets, offsets)
-        rows = np.flatnonzero(lengths >= np.maximum.reduceat(lengths, starts)[groups])
-        farthest = np.empty(len(found), np.int64)
-        farthest[groups[rows]] = rows
-        middles += (points[farthest] - middles) / (step + 1)
+    found = np.unique(owners[owners >= 0])
+    middles = cell_middles(centers, found, samples.positions, owners, ENCLOSING_STEPS)
     before = centers[found]
     after, allowed = domain.project(
         OrientedPoints(middles.astype(np.float32), before.normals, before.surface_ids)

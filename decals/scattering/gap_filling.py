@@ -31,7 +31,7 @@ MOVE = 0.5
 """Length of a move, as a share of the way to the middle."""
 
 ENCLOSING_STEPS = 24
-"""Steps toward the centre of the least ball around points (Bădoiu and Clarkson 2003)."""
+"""Steps toward the centres of the least balls around points (Bădoiu and Clarkson 2003)."""
 
 
 def fill_gaps(state: ParticleState, least: float) -> None:
@@ -104,11 +104,24 @@ def _moved(
 
 
 def cell_middles(
-    points: OrientedPoints, rows: Int64Array, samples: Float32Array, owners: Int64Array
+    points: OrientedPoints,
+    rows: Int64Array,
+    samples: Float32Array,
+    owners: Int64Array,
+    steps: int = ENCLOSING_STEPS,
 ) -> Float64Array:
     """Return the centres of the least balls around the cells of some points, ``float64[k, 3]``.
 
     A cell is the samples that a point owns; without any, its middle is the point.
+
+    Parameters
+    ----------
+    points, rows
+        The points, and which of them have the cells, in ascending order.
+    samples, owners
+        Points of the surfaces, ``float32[m, 3]``, and the row of the point that owns each, -1 for none.
+    steps
+        Steps toward the centres.
     """
     middles = points.positions.astype(np.float64)
     of_row = np.zeros(len(points), np.bool_)
@@ -118,7 +131,7 @@ def cell_middles(
     found, starts, counts = np.unique(owners[order], return_index=True, return_counts=True)
     own, groups = samples[order].astype(np.float64), np.repeat(np.arange(len(found)), counts)
     farthest = np.empty(len(found), np.int64)
-    for step in range(1, ENCLOSING_STEPS if len(found) else 1):
+    for step in range(1, steps if len(found) else 1):
         offsets = own - middles[found][groups]
         lengths = np.einsum("ni,ni->n", offsets, offsets)
         far = np.flatnonzero(lengths >= np.maximum.reduceat(lengths, starts)[groups])
