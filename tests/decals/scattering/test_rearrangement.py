@@ -12,6 +12,7 @@ from decals.scattering.decal_normals import DecalNormals
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.neighbors import NearestFacing
 from decals.scattering.rearrangement import ACTIVE, LARGEST, _kept_apart, _near_pairs, rearranged
+from decals.surfaces.surface import unit_rows
 from tests.decals.family_models import model_of
 from tests.decals.meshes import sphere
 
@@ -152,8 +153,9 @@ def test_decals_of_hard_models_are_even(name: str) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_guarded_moves_bring_no_two_decals_too_near(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    before = on_ball(on_ball(rng.normal(size=(COUNT, 3))).normals)
-    after = on_ball(on_ball(before.positions + 0.2 * rng.normal(size=(COUNT, 3))).normals)
+    places = [rng.normal(size=(COUNT, 3))]
+    places += [unit_rows(places[0]) + 0.2 * rng.normal(size=(COUNT, 3))]
+    before, after = (on_ball(unit_rows(rows).astype(np.float64)) for rows in places)
     found = _kept_apart(before, after, None, 0.05)
     facing = np.triu(before.normals @ before.normals.T > FACING_LIMIT, 1)
     facing &= found.normals @ found.normals.T > FACING_LIMIT
