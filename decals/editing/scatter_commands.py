@@ -169,12 +169,10 @@ class ScatterDecals(EditCommand):
         progress, cancel
             As for `decals.scatter`.
         """
-        for number in object_indices(self.objects):
-            whole_number("object", number, 0, len(objects) - 1, InvalidEdit)
+        covered = self.covered(objects)
         if images < 1:
             raise InvalidEdit("expected an image for the decals to show, got none; add one first")
         self.check_values()
-        covered = tuple(objects[number] for number in self.objects)
         chosen = {"images": images, **self.options}
         decals = scatter(
             [item.surface for item in covered],
@@ -191,6 +189,13 @@ class ScatterDecals(EditCommand):
         given = {"models": names, "count": len(decals), **chosen}
         recipe = Recipe.of("decals.scatter", seed=self.seed, **given).giving(decals, covered)
         return ReplaceDecals(self.objects, decals, covered, recipe)
+
+    def covered(self, objects: Sequence[SceneObject]) -> tuple[SceneObject, ...]:
+        """Return the objects of the command among all objects, or raise `InvalidEdit`."""
+        numbers = object_indices(self.objects)
+        for number in numbers:
+            whole_number("object", number, 0, len(objects) - 1, InvalidEdit)
+        return tuple(objects[number] for number in numbers)
 
     def check_values(self) -> None:
         """Raise `InvalidEdit` or `InvalidScattering` for a count, a seed or an option that is not valid."""

@@ -3,18 +3,11 @@
 import math
 from collections.abc import Callable, Sequence
 
-from blobtree import PolarRepeat, Repeat
 from blobtree.progress import Progress
-from decals.editing.scatter_commands import (
-    MAX_SCATTERED_DECALS,
-    ReplaceDecals,
-    ScatterDecals,
-    object_indices,
-)
+from decals.editing.scatter_commands import MAX_SCATTERED_DECALS, ReplaceDecals, ScatterDecals
 from decals.errors import InvalidEdit
 from decals.scattering.copies import on_copies, repeats_at_root
 from decals.scenes.objects import SceneObject, TreeObject
-from decals.validation import whole_number
 
 
 class ScatterOnCopies(ScatterDecals):
@@ -64,22 +57,21 @@ class ScatterOnCopies(ScatterDecals):
         self.check_values()
         if self.mask is not None:
             raise InvalidEdit("mask: expected none for the same decals on all copies; leave it out")
-        numbers = object_indices(self.objects)
-        for number in numbers:
-            whole_number("object", number, 0, len(objects) - 1, InvalidEdit)
-        covered = tuple(objects[number] for number in numbers)
+        covered = self.covered(objects)
         item = covered[0] if len(covered) == 1 else None
         repeats = repeats_at_root(item.tree) if isinstance(item, TreeObject) else ()
         if item is None or not repeats:
+            names = ", ".join(item.name for item in covered) or "none"
             raise InvalidEdit(
                 "same decals on all copies: expected one object whose root is a Repeat or a PolarRepeat, got "
-                f"{', '.join(item.name for item in covered)}; select such an object, or leave this out"
+                f"{names}; select such an object, or leave this out"
             )
-        each = math.ceil(self.count / _number_of_copies(repeats))
-        if each * _number_of_copies(repeats) > MAX_SCATTERED_DECALS:
+        copies = math.prod(repeat.count for repeat in repeats)
+        each = math.ceil(self.count / copies)
+        if each * copies > MAX_SCATTERED_DECALS:
             raise InvalidEdit(
                 f"same decals on all copies: expected at most {MAX_SCATTERED_DECALS:,} together, got "
-                f"{each:,} on each of {_number_of_copies(repeats):,} copies; take fewer"
+                f"{each:,} on each of {copies:,} copies; take fewer"
             )
         one = TreeObject(item.name, repeats[-1].child, origin=item.origin)
         on_one = ScatterDecals((0,), each, self.seed, self.options)
@@ -87,7 +79,3 @@ class ScatterOnCopies(ScatterDecals):
         for repeat in reversed(repeats):
             decals = on_copies(decals, repeat)
         return ReplaceDecals(self.objects, decals, covered)
-
-
-def _number_of_copies(repeats: Sequence[Repeat | PolarRepeat]) -> int:
-    return math.prod(repeat.count for repeat in repeats)

@@ -117,7 +117,7 @@ def cell_middles(
     Parameters
     ----------
     points, rows
-        The points, and which of them have the cells, in ascending order.
+        The points, and the numbers of those that have the cells.
     samples, owners
         Points of the surfaces, ``float32[m, 3]``, and the row of the point that owns each, -1 for none.
     steps
@@ -126,8 +126,8 @@ def cell_middles(
     middles = points.positions.astype(np.float64)
     of_row = np.zeros(len(points), np.bool_)
     of_row[rows] = True
-    order = np.argsort(owners, kind="stable")
-    order = order[(owners[order] >= 0) & of_row[owners[order]]]
+    owned = np.flatnonzero((owners >= 0) & of_row[owners])
+    order = owned[np.argsort(owners[owned], kind="stable")]
     found, starts, counts = np.unique(owners[order], return_index=True, return_counts=True)
     own, groups = samples[order].astype(np.float64), np.repeat(np.arange(len(found)), counts)
     farthest = np.empty(len(found), np.int64)
