@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from blobtree import PolarRepeat, Repeat
+from blobtree import Node
 from decals import Scene, Sizing, save_scene, save_table
 from decals import scatter as scatter_decals
 from decals.apps.commands.options import (
@@ -30,7 +30,7 @@ from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing
 from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar, on_copies
-from decals.scattering.copies import repeats_at_root
+from decals.scattering.copies import copy_count, repeated_trees
 from decals.scattering.neighbors import ideal_spacing
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.scenes.recipe import Recipe
@@ -135,9 +135,9 @@ def scatter(
             raise InvalidInput(f"expected a scene with objects, {model[0]!r} has none; add one with `edit`")
         own = loaded.images if images is None and isinstance(loaded, Scene) else ()
         pictures = own or scale_images(images or 1)
-        repeats = _repeats_of(objects, model[0]) if same_on_copies else ()
-        surfaces = [ImplicitSurface(repeats[-1].child)] if repeats else [item.surface for item in objects]
-        copies = math.prod(repeat.count for repeat in repeats)
+        trees = _repeated_trees(objects, model[0]) if same_on_copies else ()
+        surfaces = [ImplicitSurface(trees[-1])] if trees else [item.surface for item in objects]
+        copies = math.prod(copy_count(tree) or 1 for tree in trees)
         if spacing is not None:
             _check_spacing(spacing, copies * sum(surface.area for surface in surfaces))
         density = None
@@ -170,10 +170,10 @@ def scatter(
                 f"each of {copies:,}; take fewer"
             )
         decals = scatter_decals(
-            surfaces if repeats else list(objects), density=density, seed=seed, progress=progress, **options
+            surfaces if trees else list(objects), density=density, seed=seed, progress=progress, **options
         )
-        for repeat in reversed(repeats):
-            decals = on_copies(decals, repeat)
+        for tree in trees[-2::-1]:
+            decals = on_copies(decals, tree)
         if output.suffix.lower() in TABLE_SUFFIXES:
             save_table(decals, output, images=own, origin=objects[0].origin)
         else:
@@ -185,21 +185,21 @@ def scatter(
                 options |= {"painted": str(painted), "painted_along": painted_along, "black": black}
             names = [item.name for item in objects]
             recipe = Recipe.of("decals.scatter", seed=seed, models=names, **options).giving(decals, objects)
-            kept: dict[str, Any] = {"drawing": drawing, "recipe": None if repeats else recipe}
+            kept: dict[str, Any] = {"drawing": drawing, "recipe": None if trees else recipe}
             save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals, **kept), output)
     print_path(output)
 
 
-def _repeats_of(objects: Sequence[SceneObject], model: str) -> tuple[Repeat | PolarRepeat, ...]:
-    """Return the repeats at the root of the only model, the outer one first; InvalidInput without any."""
+def _repeated_trees(objects: Sequence[SceneObject], model: str) -> tuple[Node, ...]:
+    """Return the trees of the only model, see `repeated_trees`; InvalidInput without a repeat."""
     only = objects[0] if len(objects) == 1 else None
-    repeats = repeats_at_root(only.tree) if isinstance(only, TreeObject) else ()
-    if not repeats:
+    trees = repeated_trees(only.tree) if isinstance(only, TreeObject) else ()
+    if len(trees) < 2:
         raise InvalidInput(
             f"--same-on-copies: expected one tree whose root is a Repeat or a PolarRepeat, got {model!r}; "
             "leave the option out"
         )
-    return repeats
+    return trees
 
 
 def _check_spacing(spacing: float, area: float) -> None:

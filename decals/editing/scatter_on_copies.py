@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from blobtree.progress import Progress
 from decals.editing.scatter_commands import MAX_SCATTERED_DECALS, ReplaceDecals, ScatterDecals
 from decals.errors import InvalidEdit
-from decals.scattering.copies import on_copies, repeats_at_root
+from decals.scattering.copies import copy_count, on_copies, repeated_trees
 from decals.scenes.objects import SceneObject, TreeObject
 
 
@@ -18,7 +18,8 @@ class ScatterOnCopies(ScatterDecals):
     Parameters
     ----------
     objects
-        Index of the only object, such as ``(0,)``. The root of its tree is a repeat, or a grid of repeats.
+        Index of the only object, such as ``(0,)``. The root of its tree is a repeat, or a grid of repeats,
+        which may be below transforms.
     count
         Number of decals on all copies together. The copies share it equally, rounded up. Copies that touch
         have fewer, see `decals.scattering.on_copies`.
@@ -59,23 +60,23 @@ class ScatterOnCopies(ScatterDecals):
             raise InvalidEdit("mask: expected none for the same decals on all copies; leave it out")
         covered = self.covered(objects)
         item = covered[0] if len(covered) == 1 else None
-        repeats = repeats_at_root(item.tree) if isinstance(item, TreeObject) else ()
-        if item is None or not repeats:
+        trees = repeated_trees(item.tree) if isinstance(item, TreeObject) else ()
+        if item is None or len(trees) < 2:
             names = ", ".join(item.name for item in covered) or "none"
             raise InvalidEdit(
                 "same decals on all copies: expected one object whose root is a Repeat or a PolarRepeat, got "
                 f"{names}; select such an object, or leave this out"
             )
-        copies = math.prod(repeat.count for repeat in repeats)
+        copies = math.prod(copy_count(tree) or 1 for tree in trees)
         each = math.ceil(self.count / copies)
         if each * copies > MAX_SCATTERED_DECALS:
             raise InvalidEdit(
                 f"same decals on all copies: expected at most {MAX_SCATTERED_DECALS:,} together, got "
                 f"{each:,} on each of {copies:,} copies; take fewer"
             )
-        one = TreeObject(item.name, repeats[-1].child, origin=item.origin)
+        one = TreeObject(item.name, trees[-1], origin=item.origin)
         on_one = ScatterDecals((0,), each, self.seed, self.options)
         decals = on_one.compute_command((one,), images, progress=progress, cancel=cancel).decals
-        for repeat in reversed(repeats):
-            decals = on_copies(decals, repeat)
+        for tree in trees[-2::-1]:
+            decals = on_copies(decals, tree)
         return ReplaceDecals(self.objects, decals, covered)

@@ -1,7 +1,9 @@
 """`on_copies`: the decals of one copy of a repeat on all of its copies."""
 
+from dataclasses import replace
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree import ISO, Node, PolarRepeat, Repeat
 from blobtree._typing import Float32Array, Float64Array
@@ -16,11 +18,14 @@ from decals.validation import instance
 ON_SURFACE = 1e-3
 """Distance from the surface, in radii of a decal, up to which the decal keeps its place and its normal."""
 
+UNLIKE_SCALES = 1e-6
+"""Error of squared scales of the map from one copy to another, up to which it moves the copy alone."""
+
 MAX_DISTANCE = 0.5
 """Distance from the surface, in radii, beyond which a decal is left out: it lies inside another copy."""
 
 
-def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
+def on_copies(decals: Decals, repeat: Node) -> Decals:
     """Return the decals of a repeat's child on all copies of the child, copy by copy.
 
     The decals of each copy are those of the child, moved as the copy is. On a mirrored copy, places and the
@@ -31,9 +36,11 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     Parameters
     ----------
     decals
-        Decals on `repeat.child`, such as those of `scatter`.
+        Decals on `repeat.child`, such as those of `scatter`. If the repeat is below transforms, the child is
+        below them too.
     repeat
-        The repeat. Endless repeats have no number of copies.
+        A `Repeat` or a `PolarRepeat`, which may be below transforms. Endless repeats have no number of
+        copies.
 
     Returns
     -------
@@ -45,7 +52,8 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     InvalidDecals
         `decals` are not `Decals`.
     InvalidScattering
-        `repeat` is another node, or there would be more than 100,000,000 decals.
+        `repeat` is another node, a transform gives its copies unlike shapes, or there would be more than
+        100,000,000 decals.
     InvalidMesh
         The repeat has no surface.
 
@@ -64,12 +72,13 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     (160, [5.0, 0.0, 0.0])
     """
     instance("decals", decals, Decals, InvalidDecals, "scatter returns some")
-    if not isinstance(repeat, (Repeat, PolarRepeat)):
+    count = copy_count(repeat)
+    if count is None:
         raise InvalidScattering(f"repeat: expected a Repeat or a PolarRepeat, got {describe(repeat)}")
-    if len(decals) * repeat.count > MAX_PARTICLES:
+    if len(decals) * count > MAX_PARTICLES:
         raise InvalidScattering(
             f"decals: expected at most {MAX_PARTICLES:,} on all copies, got {len(decals):,} on each of "
-            f"{repeat.count:,}; take fewer"
+            f"{count:,}; take fewer"
         )
     copies = Decals.concatenate(_moved(decals, matrix) for matrix in _placements(repeat))
     if len(copies) == 0:
@@ -85,18 +94,38 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     )
 
 
-def repeats_at_root(tree: Node) -> tuple[Repeat | PolarRepeat, ...]:
-    """Return the repeats at the root of a tree, the outer one first; none for another tree."""
-    repeats: list[Repeat | PolarRepeat] = []
-    while isinstance(tree, Repeat | PolarRepeat):
-        repeats.append(tree)
+def repeated_trees(tree: Node) -> tuple[Node, ...]:
+    """Return a tree, then the same with its outermost repeat replaced by one copy, then the next, and so on.
+
+    Repeats count whose parents are repeats and transforms alone. Without any, the tree is the only one.
+    """
+    trees = [tree]
+    while True:
+        transforms, node = _below_transforms(trees[-1])
+        if not isinstance(node, Repeat | PolarRepeat):
+            return tuple(trees)
+        one = node.child
+        for transform in reversed(transforms):
+            one = replace(transform, child=one)
+        trees.append(one)
+
+
+def copy_count(tree: Node) -> int | None:
+    """Return the number of copies of the repeat that a tree is below its transforms; None without one."""
+    node = _below_transforms(tree)[1]
+    return node.count if isinstance(node, Repeat | PolarRepeat) else None
+
+
+def _below_transforms(tree: Node) -> tuple[list[Transform], Node]:
+    """Return the transforms at the root of a tree, and the node below them."""
+    transforms = list[Transform]()
+    while isinstance(tree, Transform):
+        transforms.append(tree)
         tree = tree.child
-    return tuple(repeats)
+    return transforms, tree
 
 
-def _on_surface(
-    repeat: Repeat | PolarRepeat, positions: Float32Array, radii: Float32Array
-) -> NDArray[np.bool_]:
+def _on_surface(repeat: Node, positions: Float32Array, radii: Float32Array) -> NDArray[np.bool_]:
     """Return False for projected points that are not on the surface, as in creases between united copies."""
     gaps = np.abs(repeat(positions) - ISO)
     slopes = np.linalg.norm(repeat.gradient(positions), axis=1)
@@ -104,12 +133,32 @@ def _on_surface(
     return reached
 
 
-def _placements(repeat: Repeat | PolarRepeat) -> list[Float64Array]:
-    """Return the affine maps (3, 4) of a repeat's child to its copies, that of the child itself first."""
-    return [
-        np.eye(3, 4) if copy is repeat.child or not isinstance(copy, Transform) else np.array(copy.matrix)
+def _placements(tree: Node) -> list[Float64Array]:
+    """Return the affine maps (3, 4) of one copy of a repeat to all, that of the copy itself first."""
+    transforms, repeat = _below_transforms(tree)
+    assert isinstance(repeat, Repeat | PolarRepeat)
+    outer = np.eye(4)
+    for transform in transforms:
+        outer = outer @ _whole(transform.matrix)
+    inverse = np.linalg.inv(outer)
+    matrices = [
+        np.eye(3, 4)
+        if copy is repeat.child or not isinstance(copy, Transform)
+        else (outer @ _whole(copy.matrix) @ inverse)[:3]
         for copy in repeat.expanded.children
     ]
+    squares = np.array([matrix[:, :3] @ matrix[:, :3].T for matrix in matrices])
+    if np.abs(squares - np.eye(3)).max() > UNLIKE_SCALES:
+        raise InvalidScattering(
+            "repeat: expected copies of one shape, got some that a transform scales in other directions than "
+            "the first; scale by one factor"
+        )
+    return matrices
+
+
+def _whole(matrix: ArrayLike) -> Float64Array:
+    """Return an affine map (3, 4) with the last row of its matrix."""
+    return np.vstack([np.asarray(matrix, np.float64), (0.0, 0.0, 0.0, 1.0)])
 
 
 def _moved(decals: Decals, matrix: Float64Array) -> Decals:

@@ -144,9 +144,10 @@ def test_spacings_of_zones_set_the_count(folder: Path) -> None:
 
 
 def test_copies_of_a_grid_get_the_same_decals(folder: Path) -> None:
-    grid = Repeat(Repeat(Point((0, 0, 0), radius=0.4), (3, 0, 0), 3), (0, 2, 0), 2)
+    ball = Point((0, 0, 0), radius=0.4)
+    grid = Repeat(Repeat(ball, (3, 0, 0), 3), (0, 2, 0), 2).translate((0, 0, 1))
     save(grid, "grid.json")
-    save(Point((0, 0, 0), radius=0.4), "ball.json")
+    save(ball.translate((0, 0, 1)), "ball.json")
     for name, options in (("grid", ["--same-on-copies"]), ("ball", [])):
         assert run(["scatter", f"{name}.json", "--count", "20", *options, "-o", f"{name}-scene.json"]) == 0
     one, scene = (load_scene(folder / f"{name}-scene.json") for name in ("ball", "grid"))

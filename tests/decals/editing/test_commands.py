@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blobtree import Repeat
-from decals import DecalImage, MeshObject, TreeObject, cover, scatter
+from decals import DecalImage, Decals, MeshObject, TreeObject, cover, scatter
 from decals.editing import (
     AddDecals,
     AddImage,
@@ -173,13 +173,26 @@ def test_copies_of_a_repeat_share_the_count_and_show_the_same_decals(count: int,
     session.do(ScatterOnCopies((0,), count, seed=5))
     decals = session.document.decals.decals
     assert len(decals) == 4 * each
-    alone = scatter(TREE, count=each, seed=5)
-    for copy, offset in enumerate(((0, 0, 0), (6, 0, 0), (0, 0, 6), (6, 0, 6))):
-        part = decals[copy * each : (copy + 1) * each]
-        np.testing.assert_allclose(part.positions, alone.positions + offset, atol=1e-5)
-        np.testing.assert_allclose(part.tangents, alone.tangents, atol=1e-5)
+    _assert_repeated(decals, scatter(TREE, count=each, seed=5), (6.0, 6.0))
     session.undo()
     assert digest(session.document) == before
+
+
+def test_copies_of_a_repeat_below_transforms_show_the_same_decals() -> None:
+    wall = Repeat(Repeat(TREE, (6, 0, 0), 2).translate((0, 5, 0)), (0, 0, 6), 2).scale((2.0, 1.0, 1.0))
+    session = EditSession(cover(wall, count=7, images=["eye"]))
+    session.do(ScatterOnCopies((0,), 40, seed=5))
+    alone = scatter(TREE.translate((0, 5, 0)).scale((2.0, 1.0, 1.0)), count=10, seed=5)
+    _assert_repeated(session.document.decals.decals, alone, (12.0, 6.0))
+
+
+def _assert_repeated(decals: Decals, alone: Decals, steps: tuple[float, float]) -> None:
+    """Assert that decals are those of one copy, moved by the steps of a grid of two by two."""
+    x, z = steps
+    for copy, offset in enumerate(((0, 0, 0), (x, 0, 0), (0, 0, z), (x, 0, z))):
+        part = decals[copy * len(alone) : (copy + 1) * len(alone)]
+        np.testing.assert_allclose(part.positions, alone.positions + offset, atol=1e-5)
+        np.testing.assert_allclose(part.tangents, alone.tangents, atol=1e-5)
 
 
 def test_relaxing_parts_those_that_crowd_and_leaves_the_far_ones(session: EditSession) -> None:

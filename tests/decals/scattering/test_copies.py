@@ -7,10 +7,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from blobtree import Box, EndlessRepeat, Node, Point, PolarRepeat, Repeat
+from blobtree import Box, EndlessRepeat, Node, Point, PolarRepeat, Repeat, Transform
 from decals import Decals, evaluate, scatter
 from decals.errors import InvalidDecals, InvalidScattering
 from decals.scattering import on_copies
+from decals.scattering.copies import copy_count, repeated_trees
 from decals.surfaces import ImplicitSurface
 from tests.vectors import random_units
 
@@ -89,6 +90,59 @@ def test_decals_lie_on_copies_that_touch_and_none_is_buried(step: float, joining
     slopes /= np.linalg.norm(slopes, axis=1, keepdims=True)
     assert np.median(np.einsum("ni,ni->n", slopes, everywhere.normals)) > 0.99
     assert_allclose(np.einsum("ni,ni->n", everywhere.tangents, everywhere.normals), 0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", APART)
+@settings(max_examples=5, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_repeat_below_transforms_gets_the_decals_moved_as_it_is(name: str, seed: int) -> None:
+    repeat, rng = APART[name], np.random.default_rng(seed)
+    axis, offset = random_units(rng, 1)[0], rng.uniform(-20.0, 20.0, 3)
+    angle, factor = rng.uniform(0.0, np.pi), rng.uniform(0.5, 2.0)
+    linear = _turn(axis, angle)
+
+    def moved(decals: Decals) -> Decals:
+        return decals.replace(
+            positions=factor * decals.positions @ linear.T + offset,
+            normals=decals.normals @ linear.T,
+            tangents=decals.tangents @ linear.T,
+            radii=factor * decals.radii,
+        )
+
+    turned = Transform(repeat, tuple((*row, 0.0) for row in linear.tolist()))
+    tree = turned.scale(factor).translate(offset.tolist())
+    marks = marks_of(repeat.child)
+    found, expected = on_copies(moved(marks), tree), moved(on_copies(marks, repeat))
+    for field, error in (("positions", 1e-4), ("normals", 1e-4), ("tangents", 1e-4), ("radii", 1e-5)):
+        assert_allclose(getattr(found, field), getattr(expected, field), atol=error)
+    trees = repeated_trees(tree)
+    assert [copy_count(one) for one in trees] == [len(repeat.expanded.children), None]
+    assert_allclose(trees[1](moved(marks).positions), 0.5, atol=1e-3)
+
+
+def _turn(axis: Any, angle: float) -> Any:
+    """Return the rotation (3, 3) around an axis (Rodrigues)."""
+    across = np.cross(np.eye(3), axis)
+    return np.eye(3) - np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+
+
+def test_transforms_may_stretch_a_row_but_not_a_ring() -> None:
+    row, ring = APART["row"], APART["ring"]
+    stretched = row.scale((1.0, 2.0, 1.0))
+    marks = scatter(repeated_trees(stretched)[1], count=24)
+    everywhere = on_copies(marks, stretched)
+    assert_allclose(everywhere.positions[48:] - marks.positions, [[4.0, 2.0, 0.0]] * 24, atol=1e-5)
+    with pytest.raises(InvalidScattering, match="expected copies of one shape"):
+        on_copies(marks, ring.scale((1.0, 2.0, 1.0)))
+
+
+def test_the_trees_of_a_grid_below_transforms_end_at_its_child() -> None:
+    row = Repeat(STONE, (2, 0, 0), 2).translate((0, 1, 0))
+    grid = Repeat(row, (0, 2, 0), 3).scale(2.0)
+    trees = repeated_trees(grid)
+    assert [copy_count(tree) for tree in trees] == [3, 2, None]
+    assert trees == (grid, row.scale(2.0), STONE.translate((0, 1, 0)).scale(2.0))
+    assert repeated_trees(STONE) == (STONE,)
 
 
 def test_nothing_stays_nothing() -> None:
