@@ -5,7 +5,9 @@ result, and averaged with premultiplied alpha, so that edges are smooth in every
 """
 
 import math
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +23,9 @@ WORK_SIZE = 768
 MAX_SUPERSAMPLING = 16
 """Largest number of samples per pixel and axis."""
 
+BAND_SAMPLES = 1 << 15
+"""Samples of the rows that are drawn at once: arrays of so many fit into the cache of a core."""
+
 Vector = tuple[float, float, float]
 
 SUN: Vector = (-0.28, 0.36, 0.89)
@@ -29,13 +34,13 @@ SUN: Vector = (-0.28, 0.36, 0.89)
 
 @dataclass(frozen=True)
 class Canvas:
-    """Sample positions of a square drawing: x to the right (u), y up (v), both from -1 to 1.
+    """Sample positions of some rows of a square drawing: x to the right (u), y up (v), both from -1 to 1.
 
     Attributes
     ----------
-    x, y : float32[n, n]
-        Coordinates; the decal's rim is the circle ``rho == 1``. Row 0 is the top of the image.
-    rho : float32[n, n]
+    x, y : float32[m, n]
+        Coordinates; the decal's rim is the circle ``rho == 1``. Row 0 is the topmost.
+    rho : float32[m, n]
         Distance from the centre.
     step : float
         Distance between neighbouring samples.
@@ -47,11 +52,11 @@ class Canvas:
     step: float
 
     @classmethod
-    def of_size(cls, samples: int) -> "Canvas":
-        """Return the canvas of ``samples`` x ``samples`` sample positions."""
+    def of_rows(cls, samples: int, first: int, last: int) -> "Canvas":
+        """Return the rows ``first`` to ``last - 1`` of ``samples`` x ``samples`` positions."""
         step = 2.0 / samples
         ticks = ((np.arange(samples, dtype=np.float32) + 0.5) * step - 1.0).astype(np.float32)
-        x, y = np.meshgrid(ticks, ticks[::-1])
+        x, y = np.meshgrid(ticks, ticks[::-1][first:last])
         return cls(x, y, np.hypot(x, y), step)
 
     def below(self, value: Field, limit: float) -> Field:
@@ -60,7 +65,10 @@ class Canvas:
 
 
 Painter = Callable[[Canvas], tuple[Field, Field]]
-"""Function of a canvas that returns colour float32[n, n, 3] and opacity float32[n, n], both in [0, 1]."""
+"""Function of a canvas that returns colour float32[m, n, 3] and opacity float32[m, n], both in [0, 1].
+
+A sample depends on its position alone, and on the height at its neighbours.
+"""
 
 
 def draw(paint: Painter, size: int) -> NDArray[np.uint8]:
@@ -79,14 +87,25 @@ def draw(paint: Painter, size: int) -> NDArray[np.uint8]:
         Straight (not premultiplied) RGBA, row 0 at the top.
     """
     factor = int(np.clip(WORK_SIZE // size, 1, MAX_SUPERSAMPLING))
-    color, alpha = paint(Canvas.of_size(size * factor))
+    rows = max(1, BAND_SAMPLES // (size * factor**2))
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        bands = pool.map(lambda first: _band(paint, size, factor, first, first + rows), range(0, size, rows))
+        return np.concatenate(list(bands))
+
+
+def _band(paint: Painter, size: int, factor: int, first: int, last: int) -> NDArray[np.uint8]:
+    """Return the rows ``first`` to ``last - 1`` of pixels of an image, as `draw` does."""
+    last = min(last, size)
+    above, below = max(first * factor - 1, 0), min(last * factor + 1, size * factor)
+    own = np.s_[first * factor - above : last * factor - above]  # without the rows of the slopes' neighbours
+    color, alpha = (part[own] for part in paint(Canvas.of_rows(size * factor, above, below)))
     layers = np.concatenate([color * alpha[..., None], alpha[..., None]], axis=-1)
-    mean = layers.reshape(size, factor, size, factor, 4).mean(axis=(1, 3))
+    mean = layers.reshape(last - first, factor, size, factor, 4).mean(axis=(1, 3))
     opacity = mean[..., 3:]
     straight = mean[..., :3] / np.maximum(opacity, 1e-3)
     if opacity.min() <= 1e-3:
         # A fully transparent pixel keeps the unweighted colour, so that filters read no black at the edge.
-        plain = color.reshape(size, factor, size, factor, 3).mean(axis=(1, 3))
+        plain = color.reshape(last - first, factor, size, factor, 3).mean(axis=(1, 3))
         straight = np.where(opacity > 1e-3, straight, plain)
     pixels = np.concatenate([straight, opacity], axis=-1)
     return np.asarray(np.rint(np.clip(pixels, 0.0, 1.0) * 255.0), dtype=np.uint8)

@@ -17,7 +17,6 @@ from decals.scattering.orientation import Direction
 from decals.scattering.scatter import scatter
 from decals.scattering.sizing import Sizing
 from decals.scenes.camera import REFERENCE_ASPECT, THREE_QUARTER, UPRIGHT, Camera, Vector
-from decals.scenes.files import load_model
 from decals.scenes.objects import MeshObject, SceneObject, as_objects
 from decals.scenes.recipe import Recipe
 from decals.scenes.scene import Scene, as_images
@@ -195,7 +194,11 @@ def scene_or_objects(model: object) -> SceneLike | list[SceneObject]:
     InvalidScene, InvalidMesh, InvalidFile
         If the model is of another kind, or cannot be used.
     """
-    loaded = load_model(model) if isinstance(model, str | os.PathLike) else model
+    loaded = model
+    if isinstance(model, str | os.PathLike):
+        from decals.scenes.files import load_model  # needs all kinds of nodes: half a second of imports
+
+        loaded = load_model(model)
     if is_scene_like(loaded):
         return cast(SceneLike, loaded)
     return as_objects(loaded if isinstance(loaded, list) and loaded else [loaded])

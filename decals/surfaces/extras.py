@@ -16,9 +16,10 @@ with if_present():
 
     READERS |= {"file": read_mesh_data, "dataset": dataset_mesh, "trimesh": trimesh_color}
 with if_present():
-    from blobtree.foreign.reading import read_tree
+    import blobtree.foreign
 
-    READERS["tree"] = read_tree
+    # the kinds of nodes that it knows take half a second to import
+    READERS["tree"] = lambda path: blobtree.foreign.read_tree(path)
 with if_present():
     from decals.surfaces.tree_parts import has_small_parts, nearest_leaves, polygonize_parts
 

@@ -78,10 +78,16 @@ def test_public_functions_are_no_packages() -> None:
         assert type(getattr(decals, name)).__name__ != "module", name
 
 
-def test_importing_the_errors_loads_nothing_heavy() -> None:
-    heavy = {"warp", "pyvista", "moderngl", "vtk"}
-    code = f"import sys, decals.errors; print(sorted({heavy} & sys.modules.keys()))"
-    assert output_of(code).strip() == "[]"
+@pytest.mark.parametrize(
+    ("statement", "heavy"),
+    [
+        ("import decals.errors", {"warp", "pyvista", "moderngl", "vtk"}),
+        ("from decals import cover", {"blobtree.io", "blobtree.foreign.reading", "decals.scenes.files"}),
+    ],
+)
+def test_imports_load_nothing_heavy(statement: str, heavy: set[str]) -> None:
+    """Readers of files load all kinds of nodes: half a second."""
+    assert output_of(f"import sys; {statement}; print(sorted({heavy} & sys.modules.keys()))").strip() == "[]"
 
 
 def test_docstrings_of_commands_describe_all_parameters() -> None:

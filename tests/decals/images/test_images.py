@@ -11,7 +11,7 @@ import decals
 from blobtree._typing import Float64Array
 from decals import load_image
 from decals.errors import InvalidImage, InvalidScene
-from decals.images import BUILTIN_IMAGES, MAX_IMAGE_EDGE, generate_image, image_pixels, read_image
+from decals.images import BUILTIN_IMAGES, MAX_IMAGE_EDGE, canvas, generate_image, image_pixels, read_image
 from decals.images import load as load_module
 from decals.images.load import each_image, embedded_image, is_embedded
 from decals.images.texels import as_bytes, linear_premultiplied
@@ -38,6 +38,19 @@ def test_any_size_is_rgba_and_repeats(name: str, size: int) -> None:
     assert image.dtype == np.uint8
     generate_image.cache_clear()
     assert np.array_equal(image, generate_image(name, size))
+
+
+@pytest.mark.parametrize("name", BUILTIN_IMAGES)
+def test_images_drawn_in_bands_are_those_drawn_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(canvas, "WORK_SIZE", 99)
+    images = []
+    for samples in (1, 5000, 1 << 20):  # bands of one row, of many, and all rows at once
+        monkeypatch.setattr(canvas, "BAND_SAMPLES", samples)
+        generate_image.cache_clear()
+        images.append(generate_image(name, 33))
+    generate_image.cache_clear()
+    assert np.array_equal(images[0], images[2])
+    assert np.array_equal(images[1], images[2])
 
 
 @pytest.mark.parametrize("name", FULL)
