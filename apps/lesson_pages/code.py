@@ -126,12 +126,18 @@ def said(text: str, code: Callable[[str], str], definitions: Mapping[str, str]) 
 
 
 def access(path: str) -> dict[str, "Code"]:
-    """Return functions that read and write what a slider moves: a value of a page ``p`` of a lesson."""
+    """Return functions that read and write what a slider moves: a value of a page ``p`` of a lesson.
+
+    The one that writes a value of decals returns the step of undo that it continued or began.
+    """
     read, write = {
         "contact": ("p.viewer.mode", "p.viewer.set({ mode: value })"),
         "stiffness": ("p.viewer.stiffness", "p.viewer.set({ stiffness: value })"),
-        "mapping": ("p.mapping", "p.map(value)"),
-        **{f"probe.{axis}": (f"p.probe[{i}]", f"p.probe[{i}] = value") for i, axis in enumerate(AXES)},
+        "mapping": ("undefined", "p.map(value)"),  # its choice says it
+        **{
+            f"probe.{axis}": (f"p.probe[{i}]", f"p.moveProbe(p.probe.with({i}, value))")
+            for i, axis in enumerate(AXES)
+        },
     }.get(path) or _access_to_decals(path)
     return {"read": Code(f"(p) => {read}"), "write": Code(f"(p, value) => {write}")}
 
@@ -142,12 +148,15 @@ def _access_to_decals(path: str) -> tuple[str, str]:
             i = AXES.index(name)
             moved = f"p.measures.above({{ ...row, position: row.position.with({i}, value) }})"
             change = f"(row) => (({{ position, normal }}) => ({{ position, normal }}))({moved})"
-            return f"p.viewer.decals.rows[{row}]?.position[{i}]", f"p.edit([{row}], {change})"
+            return (
+                f"p.viewer.decals.rows[{row}]?.position[{i}]",
+                f"p.viewer.editRows([{row}], {change}, p.step)",
+            )
         case DecalPath(row=row, name=name):
             numbers = "p.viewer.decals.numbers" if row is None else f"[{row}]"
             return (
                 f"p.viewer.decals.rows[{row or 0}]?.{name}",
-                f"p.edit({numbers}, () => ({{ {name}: value }}))",
+                f"p.viewer.editRows({numbers}, () => ({{ {name}: value }}), p.step)",
             )
     return "undefined", "undefined"  # the sliders of a table are read when its state is shown
 

@@ -16,7 +16,6 @@ const DIFFERENCE = 1e-3; // of differences, in radii of the smallest decal
 const sum = (values) => values.reduce((a, b) => a + b, 0);
 const greatest = (values) => values.reduce((a, b) => (b > a ? b : a), -Infinity); // numbers alone count
 const discOf = ({ radius }) => Math.PI * radius ** 2;
-const falloff = (d) => (d < 1 ? (1 - d * d) ** 3 : 0);
 
 // Numbers in the middles of equal parts of a range.
 const spread = (low, high, count) =>
@@ -64,7 +63,7 @@ export class Measures {
     }));
   }
 
-  // The points that pixels show, row by row from the lowest, nearly straight from the side of `back`. The picture is
+  // The points that pixels show, row by row from the highest, nearly straight from the side of `back`. The picture is
   // twice as wide as `half`.
   read({ target, back, up, half }, width, height) {
     const { viewer } = this;
@@ -84,7 +83,8 @@ export class Measures {
       return texels;
     });
     return Array.from({ length: width * height }, (_, i) => {
-      const [position, normal, image] = targets.map((texels) => [...texels.subarray(4 * i, 4 * i + 4)]);
+      const first = 4 * ((height - 1 - Math.floor(i / width)) * width + (i % width)); // the lowest row comes first
+      const [position, normal, image] = targets.map((texels) => [...texels.subarray(first, first + 4)]);
       const [owner, exists, [field, stretch, folded]] = [position.pop(), normal.pop(), image];
       return { position, normal, owner, exists, field, stretch: owner < 0 ? NaN : stretch, folded };
     });
@@ -96,21 +96,18 @@ export class Measures {
     return { ...camera, back: unit(subtract(camera.position, camera.target)), half: size / 2 };
   }
 
-  // The points that pixels of a map show, row by row from the lowest; those that the surface has; points of the line.
+  // The points that pixels of a map show, and of a part around its middle; those that the surface has; points of the line.
   map = () => (this.known.map ??= this.read(this.view(), SIDE, SIDE));
-  // The points of a part of the map around its middle, row by row from the top.
-  onPad(half) {
-    const rows = this.read({ ...this.view(), half }, SIDE, SIDE);
-    return rows.map((_, i) => rows[(SIDE - 1 - Math.floor(i / SIDE)) * SIDE + (i % SIDE)]);
-  }
-
+  onPad = (half) => this.read({ ...this.view(), half }, SIDE, SIDE);
   surface = () => (this.known.surface ??= this.map().filter((point) => point.exists));
   curve = () => (this.known.curve ??= this.along(SAMPLES));
 
   // Points of a plot over numbers, which has no place in the scene: along one range, or row by row over two.
   numbersAlong = (x) => spread(...x, SAMPLES).map((right) => ({ x: right }));
   numbersOver = (x, y) =>
-    spread(...y, SIDE).flatMap((up) => spread(...x, SIDE).map((at) => ({ x: at, y: up })));
+    spread(...y, SIDE)
+      .reverse()
+      .flatMap((up) => spread(...x, SIDE).map((at) => ({ x: at, y: up })));
 
   // The ends of the line, its direction, and the least and the greatest distance along it.
   line() {
@@ -125,11 +122,8 @@ export class Measures {
   // Points along the line, with "x".
   along(count) {
     const { first, direction, low, high } = this.line();
-    const [back, half, placeOf] = [
-      this.view().back,
-      (high - low) / 2,
-      (x) => add(first, scaled(direction, x)),
-    ];
+    const placeOf = (x) => add(first, scaled(direction, x));
+    const [half, { back }] = [(high - low) / 2, this.view()];
     const seen = { target: placeOf(low + half), back, up: cross(back, direction), half };
     const points = this.read(seen, count, 1);
     return spread(low, high, count).map((x, i) => ({ ...placed(points[i], { position: placeOf(x) }), x }));
@@ -153,9 +147,9 @@ export class Measures {
   distance = (q, i, k) => length(subtract(this.row(i).position, this.row(k).position));
   radius = (q, i) => Math.fround(this.row(i).radius);
   influence = (q, i) => this.radius(q, i) / this.viewer.header.rules.rim;
-  g = (q, d) => falloff(d);
+  g = (q, d) => (d < 1 ? (1 - d * d) ** 3 : 0);
   d = (q, i) => length(subtract(q.position, this.row(i).position)) / this.influence(q, i);
-  f = (q, i) => falloff(this.d(q, i));
+  f = (q, i) => this.g(q, this.d(q, i));
   numbers = () => (this.known.numbers ??= this.viewer.decals.numbers); // listed once, not at each point
   top = (q) => Math.max(0, ...this.numbers().map((number) => this.f(q, number)));
   F = (q) => (q.owner >= 0 ? q.field : Math.min(this.top(q), 0.5));

@@ -42,8 +42,8 @@ from decals.scenes.scene import Scene
 from decals.shaders import compose
 
 FILES = Path(__file__).parent
-SKETCH = FILES.parent / "sandbox" / "sketch.mjs"
-"""The module of sketches, which the contact lab has, too."""
+SHARED = tuple(FILES.parent / "sandbox" / name for name in ("sketch.mjs", "scores.mjs"))
+"""The modules of sketches and of scores, which the contact lab has, too."""
 MODULES = "measures", "plots", "puzzles", "answers", "lesson"
 """Modules of a lesson, each after those that it imports."""
 
@@ -61,10 +61,11 @@ BLOCKS = 8
 """Blocks along trees, for rays: few, as a page has many trees."""
 
 SEND = (
-    '<form class="send"><label>{person} <input name="person" maxlength="40" autocomplete="off"></label> '
+    '<form class="send" name="sent" method="dialog"><label>{person} '
+    '<input name="person" maxlength="40" autocomplete="off"></label> '
     '<button>{send}</button> <output role="status"></output></form>'
 )
-"""What a student sends in a class."""
+"""What a student sends in a class; the method "dialog" of a form asks no server."""
 
 COLORS_OF_MAP = 64
 """Colours between the lowest and the highest value of a map."""
@@ -160,8 +161,10 @@ def no_page(lesson: Lesson) -> str | None:
 def lesson_script() -> str:
     """Return the viewer with the modules of lessons, as one ES module."""
     return viewer_script(
-        SKETCH.read_text(encoding="utf-8"),
-        *((FILES / f"{name}.mjs").read_text(encoding="utf-8") for name in MODULES),
+        *(
+            path.read_text(encoding="utf-8")
+            for path in (*SHARED, *(FILES / f"{name}.mjs" for name in MODULES))
+        ),
         name="begin",
     )
 
@@ -197,8 +200,7 @@ def _record(lesson: Lesson, words: Translation, table: Table | None) -> dict[str
         "probe": settings.probe,
         "axes": axes or [0, 1, 2],
         "up": np.asarray(camera.axes[2]).tolist(),
-        "mode": settings.contact,
-        "stiffness": settings.stiffness,
+        "drawing": {"mode": settings.contact, "stiffness": settings.stiffness},
         "mapping": settings.mapping,
         "mappings": [mapping.name.lower() for mapping in sorted(ImageMapping)],
         "rows": _rows(lesson.scene),
@@ -246,7 +248,10 @@ def _live(lesson: Lesson, words: Translation, table: Table | None) -> dict[str, 
                 {"formula": value(c.formula, "[q.i]" if table else ""), "look": look}
                 for c, look in _lines(plot)
             ],
-            "acts": {symbol: value(formula) for symbol, formula in acts.items()},
+            "acts": [
+                {"formula": value(formula), "look": f'data-region="{symbol}"'}
+                for symbol, formula in acts.items()
+            ],
             "map": plot.map and value(plot.map),
             "red": plot.red and value(plot.red),
             "marks": () if table else [[value(one) for one in pair] for pair in plot.marks],
@@ -317,9 +322,9 @@ def _markup(
         )
     )
     form = guess and (
-        f'<form class="guess"><p>{text(guess.text)}</p>{sketch or ""}<p><label>{text(guess.label)} '
-        f'<input name="guess" type="number" required min="{guess.low:g}" max="{guess.high:g}" '
-        f'step="{guess.step:g}"></label> '
+        f'<form class="guess" name="guessed" method="dialog"><p>{text(guess.text)}</p>{sketch or ""}'
+        f'<p><label>{text(guess.label)} <input name="guess" type="number" required '
+        f'min="{guess.low:g}" max="{guess.high:g}" step="{guess.step:g}"></label> '
         f"<button>{words.page['see']}</button> "
         f'<button type="button" name="skip">{words.page["skip"]}</button></p></form>'
     )
@@ -331,7 +336,7 @@ def _markup(
     scores = (
         f'<table class="scores"><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table>'
         f'<p><button type="button" name="share">{words.page["share"]}</button></p>'
-        '<p class="shared" role="status"></p>'
+        '<p class="shared" role="status"><a></a></p>'
     )
     plots = "".join(
         f'<div class="plot"><h2>{text(plot.title)}</h2><div class="formula"></div>{_key(plot, words)}'

@@ -1,4 +1,5 @@
-// Puzzles: sizes of decals and pars from the address, and scores, of which the browser keeps the best.
+// Puzzles: sizes of decals and pars from the address, and scores.
+import { best, copyAddress } from "../sandbox/scores.mjs";
 
 // The puzzle of an address, or that of the lesson.
 export function puzzleOf(fragment, { rows, scores, size }) {
@@ -10,17 +11,6 @@ export function puzzleOf(fragment, { rows, scores, size }) {
   return { radii: rows.map(({ radius }) => radius), pars: scores.map(({ par }) => par) };
 }
 
-// The least value so far; one that counts may be the new least.
-function best(key, value, counts) {
-  try {
-    const known = Number(localStorage.getItem(key) ?? Infinity);
-    if (counts && value < known) localStorage.setItem(key, value);
-    return counts ? Math.min(value, known) : known;
-  } catch {
-    return value; // the browser keeps nothing
-  }
-}
-
 // Show the scores of a page, with the pars if its decals have the sizes of the puzzle.
 export function showScores(page, counts) {
   const { lesson, live, puzzle } = page;
@@ -30,7 +20,8 @@ export function showScores(page, counts) {
   const isOwn = sizes === sizesOf(puzzle.radii);
   const values = live.scores.map((score) => page.value(score));
   page.all(".scores tbody tr").forEach((line, i) => {
-    const least = best(`${lesson.name} puzzle=${sizes} ${lesson.scores[i].formula}`, values[i], counts);
+    const key = `${lesson.name} puzzle=${sizes} ${lesson.scores[i].formula}`;
+    const least = best(key, counts ? values[i] : null);
     const star = isOwn && least <= puzzle.pars[i] ? " ★" : "";
     const texts = [say(values[i]), isOwn ? say(puzzle.pars[i]) : "–", say(least) + star];
     texts.forEach((text, column) => (line.cells[column + 1].textContent = text));
@@ -40,8 +31,6 @@ export function showScores(page, counts) {
 
 // Copy a link to the puzzle of the present sizes, whose pars are the present scores, and show it.
 export function share(page) {
-  const link = `${location.href.split("#")[0]}#${page.shared}`;
-  navigator.clipboard?.writeText(link).catch(() => {}); // it can be copied from the page, too
-  const shown = Object.assign(document.createElement("a"), { href: link, textContent: link });
-  page.root.querySelector(".shared").replaceChildren(shown);
+  const link = copyAddress(page.shared);
+  Object.assign(page.root.querySelector(".shared a"), { href: link, textContent: link });
 }

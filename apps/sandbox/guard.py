@@ -31,8 +31,10 @@ from aiohttp.http_exceptions import HttpProcessingError
 if sys.platform != "win32":
     import resource
 
-PARTS = (Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("sketch.mjs", "page.js"))
-SCRIPT = "".join(PARTS).replace("export ", "") + "trame.utils.sketch = { draw, keep, compared };\n"
+NAMES = "sketch.mjs", "scores.mjs", "page.js"
+PARTS = (Path(__file__).with_name(name).read_text(encoding="utf-8") for name in NAMES)
+LAB = "draw, keep, compared, best, copy, copyAddress"
+SCRIPT = f"{''.join(PARTS).replace('export ', '')}trame.utils.lab = {{ {LAB} }};\n"
 """The script of the page."""
 
 LOOPBACK = "127.0.0.1"

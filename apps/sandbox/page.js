@@ -208,31 +208,15 @@
       if (sought) return this.found(`${row.label} ${row.type}`, sought);
       return !folded.some((key) => isBelow(row.key, key));
     },
-    copy(text) {
-      navigator.clipboard?.writeText(text); // browsers have it on this machine and by https
-    },
-    // Copy the address of this page with a puzzle behind it, and return it.
-    share(text) {
-      const link = `${location.href.split("#")[0]}#${text}`;
-      this.copy(link);
-      return link;
-    },
     // Call a function with the puzzle of the address if there is one, now and when the address changes.
     puzzles(call) {
       const play = () => location.hash.startsWith("#puzzle=") && call(location.hash.slice(1));
       addEventListener("hashchange", play);
       play();
     },
-    // Return the least value so far as a text, with a star at par; one that is given may be the new least.
-    best(key, value, par) {
-      let least = value ?? Infinity;
-      try {
-        least = Math.min(least, Number(localStorage.getItem(key) ?? Infinity));
-        if (Number.isFinite(least)) localStorage.setItem(key, least);
-      } catch {
-        // the browser keeps nothing for this page, as in some frames
-      }
-      return Number.isFinite(least) ? `${Number(least.toPrecision(3))}${least <= par ? " ★" : ""}` : "–";
+    // Return a score as a text, with a star at par.
+    scored(score, par) {
+      return Number.isFinite(score) ? `${Number(score.toPrecision(3))}${score <= par ? " ★" : ""}` : "–";
     },
     // Return true for a text that has what is sought, in large or small letters.
     found(text, sought) {

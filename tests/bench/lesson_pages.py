@@ -21,7 +21,7 @@ SLIDES = """(steps) => {
     FINISH
     const began = performance.now();
     slider.value = Number(min) + (0.2 + (0.6 * i) / steps) * (max - min);
-    slider.dispatchEvent(new Event("input"));
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
     page.show();
     times.push(performance.now() - began);
   }
@@ -43,7 +43,7 @@ async def measured_lessons(steps: int) -> dict[str, float]:
                 lesson_page(lesson).save(path)
                 page = await browser.new_page(viewport=SIZE)
                 await page.goto(path.as_uri())
-                await page.wait_for_function("document.getElementById('lesson').dataset.ready")
+                await page.wait_for_function("globalThis.page?.root")
                 firsts.append(await page.evaluate(FIRST_FRAME))
                 await page.get_by_role("button", name="Skip the guess").click()
                 await page.wait_for_function("page.root.dataset.shown")

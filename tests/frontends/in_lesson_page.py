@@ -53,7 +53,7 @@ CLOSE = 0.02
 
 SET = """(input, value) => {
   input.value = value;
-  for (const name of ["input", "change"]) input.dispatchEvent(new Event(name));
+  for (const name of ["input", "change"]) input.dispatchEvent(new Event(name, { bubbles: true }));
 }"""
 
 
@@ -62,6 +62,13 @@ EXPLAINED = """() => {
   return content === "attr(title)" ? document.activeElement.title : content;
 }"""
 """The definition that a page shows of the symbol with the focus; Firefox names the attribute."""
+
+IN_SIGHT = """() => {
+  const question = document.querySelector(".question");
+  const { left, top } = question.getBoundingClientRect();
+  return question.contains(document.elementFromPoint(left + 5, top + 5));
+}"""
+"""True if the question is in the window, and not below the model, which stays in sight on a phone."""
 
 LOOK = "(line, name) => getComputedStyle(line)[name]"
 
@@ -87,7 +94,7 @@ def truths(lesson: Lesson, *formulas: str) -> list[float]:
 async def ready(page: Page) -> None:
     """Wait until the viewer of a page is ready, or raise an error with what the page shows in its place."""
     try:
-        await page.wait_for_selector("#lesson[data-ready]", timeout=PATIENCE)
+        await page.wait_for_function("globalThis.page?.root", timeout=PATIENCE)
     except Error as error:
         raise AssertionError(await page.inner_text("#viewer")) from error
 
@@ -160,6 +167,7 @@ async def learned(browser: Browser, lesson: Lesson, attempts: list[Attempt], pat
     assert not await page.locator(".after:visible").count()
     await page.locator("[name=guess]").fill("1")
     await page.get_by_role("button", name="See", exact=True).click()
+    await expect(page.locator(".question")).to_be_focused()
     await settled(page)
     assert re.match(r"You guessed .*, it is", await page.inner_text(".seen"))
     question, meters = lesson.settings.guess, page.locator(".meter meter")
@@ -180,6 +188,9 @@ async def learned(browser: Browser, lesson: Lesson, attempts: list[Attempt], pat
     await accessible(page)
     if is_chromium(page):
         await touched(page)
+    await press(page, "Start again")
+    await page.wait_for_selector("#lesson[data-waits=true]")
+    assert await page.evaluate("page.probe") == [*lesson.settings.probe]
     await page.goto(f"{path.as_uri()}#task=1")
     await page.reload()
     await page.wait_for_selector("[id='task=1']:target", timeout=PATIENCE)
@@ -199,6 +210,7 @@ async def fitted(browser: Browser, lesson: Lesson, path: Path) -> None:
         assert await page.evaluate(CUT) == []
         await press(page, "Skip the guess")
         await settled(page)
+        await page.wait_for_function(IN_SIGHT, timeout=PATIENCE)
         await press(page, "Check the answer")
         await settled(page)
         assert await page.inner_text(".verdict")

@@ -143,10 +143,14 @@ export class Viewer {
     return changes.length ? this.history.change(changes, step) : step;
   }
 
-  editSelected(change, step) {
-    const row = this.decals.rows[this.selected];
-    return row && this.edit([[this.selected, { ...row, ...change(row) }]], step);
+  // Change decals by a function of their rows.
+  editRows(numbers, change, step) {
+    const rows = numbers.map((number) => [number, this.decals.rows[number]]).filter(([, row]) => row);
+    const changed = rows.map(([number, row]) => [number, { ...row, ...change(row) }]);
+    return this.edit(changed, step);
   }
+
+  editSelected = (change, step) => this.editRows([this.selected], change, step);
 
   // Move the selected decal to a point of the surface; its image is carried along.
   moveTo(hit, step) {

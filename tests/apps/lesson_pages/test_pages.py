@@ -19,7 +19,7 @@ from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.puzzles import Puzzle, read_puzzle
 from decals.apps.lab.symbols import DEFINITIONS
 from decals.apps.lesson_pages.code import FORMS, WORDS, javascript
-from decals.apps.lesson_pages.page import KNOWN, SKETCH, lesson_page, lesson_script, no_page
+from decals.apps.lesson_pages.page import KNOWN, SHARED, lesson_page, lesson_script, no_page
 from decals.apps.lesson_pages.tables import MOST, positions_of, tabulated
 from decals.apps.lesson_pages.translation import LANGUAGES, translation
 from decals.errors import InvalidInput
@@ -170,7 +170,7 @@ def test_an_outline_is_compared_cell_by_cell(seed: int) -> None:
     ways, offsets = np.roll(corners, -1, axis=0) - corners, cells[:, None] - corners
     drawn = (ways[:, 0] * offsets[..., 1] > ways[:, 1] * offsets[..., 0]).all(axis=1)  # it is convex
     script = f"""
-import {{ compared }} from {json.dumps(SKETCH.as_uri())};
+import {{ compared }} from {json.dumps(SHARED[0].as_uri())};
 const found = compared(() => data.cells, data.half, data.corners);
 const none = compared(() => data.cells, data.half, [[0, 0], [1, 1]]);
 console.log(JSON.stringify([found.difference, found.parts, none]));"""
@@ -179,6 +179,24 @@ console.log(JSON.stringify([found.difference, found.parts, none]));"""
     assert difference == pytest.approx((drawn != true).sum() / true.sum())
     assert parts.count("M") == true.sum()
     assert none is None
+
+
+@needs_node
+@pytest.mark.parametrize("keeps", [True, False])
+def test_the_browser_keeps_the_least_score(keeps: bool) -> None:
+    scores = [None, 3.5, None, 4.0, 2.25, None]
+    script = f"""
+import {{ best }} from {json.dumps(SHARED[1].as_uri())};
+const kept = new Map();
+const getItem = (key) => kept.get(key) ?? null;
+const setItem = (key, value) => kept.set(key, String(value));
+const getNone = () => {{ throw new Error("this frame keeps nothing"); }};
+globalThis.localStorage = {{ getItem: {json.dumps(keeps)} ? getItem : getNone, setItem }};
+const all = data.map((score) => best("of this puzzle", score));
+console.log(JSON.stringify([...all, best("of another one", null)]));"""
+    found = [np.inf if score is None else score for score in run_node(script, scores)]
+    given = [np.inf if score is None else score for score in scores]
+    assert found == [*(np.minimum.accumulate(given) if keeps else given), np.inf]
 
 
 @needs_node
