@@ -29,8 +29,8 @@ from decals.apps.output import check_output, print_path
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing
-from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar, on_copies
-from decals.scattering.copies import copy_count, repeated_trees
+from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar
+from decals.scattering.copies import copy_count, on_all_copies, repeated_trees
 from decals.scattering.neighbors import ideal_spacing
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.scenes.recipe import Recipe
@@ -172,8 +172,8 @@ def scatter(
         decals = scatter_decals(
             surfaces if trees else list(objects), density=density, seed=seed, progress=progress, **options
         )
-        for tree in trees[-2::-1]:
-            decals = on_copies(decals, tree)
+        if trees:
+            decals = on_all_copies(decals, trees[0])
         if output.suffix.lower() in TABLE_SUFFIXES:
             save_table(decals, output, images=own, origin=objects[0].origin)
         else:
@@ -183,9 +183,11 @@ def scatter(
                 camera, drawing = frame(objects, parse_view(None, axes_of(model[0])), ASPECT), Drawing()
             if painted is not None:
                 options |= {"painted": str(painted), "painted_along": painted_along, "black": black}
+            if trees:
+                options["same_on_copies"] = True
             names = [item.name for item in objects]
             recipe = Recipe.of("decals.scatter", seed=seed, models=names, **options).giving(decals, objects)
-            kept: dict[str, Any] = {"drawing": drawing, "recipe": None if trees else recipe}
+            kept: dict[str, Any] = {"drawing": drawing, "recipe": recipe}
             save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals, **kept), output)
     print_path(output)
 

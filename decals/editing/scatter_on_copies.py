@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from blobtree.progress import Progress
 from decals.editing.scatter_commands import MAX_SCATTERED_DECALS, ReplaceDecals, ScatterDecals
 from decals.errors import InvalidEdit
-from decals.scattering.copies import copy_count, on_copies, repeated_trees
+from decals.scattering.copies import copy_count, on_all_copies, repeated_trees
 from decals.scenes.objects import SceneObject, TreeObject
 
 
@@ -76,7 +77,9 @@ class ScatterOnCopies(ScatterDecals):
             )
         one = TreeObject(item.name, trees[-1], origin=item.origin)
         on_one = ScatterDecals((0,), each, self.seed, self.options)
-        decals = on_one.compute_command((one,), images, progress=progress, cancel=cancel).decals
-        for tree in trees[-2::-1]:
-            decals = on_copies(decals, tree)
-        return ReplaceDecals(self.objects, decals, covered)
+        made = on_one.compute_command((one,), images, progress=progress, cancel=cancel)
+        decals = on_all_copies(made.decals, trees[0])
+        assert made.recipe is not None
+        parameters = {**made.recipe.parameters, "same_on_copies": True}
+        recipe = replace(made.recipe, parameters=parameters).giving(decals, covered)
+        return ReplaceDecals(self.objects, decals, covered, recipe)

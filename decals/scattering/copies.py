@@ -94,6 +94,13 @@ def on_copies(decals: Decals, repeat: Node) -> Decals:
     )
 
 
+def on_all_copies(decals: Decals, tree: Node) -> Decals:
+    """Return decals of one copy on all copies of a tree; `decals` lie on the last of `repeated_trees`."""
+    for repeated in repeated_trees(tree)[-2::-1]:
+        decals = on_copies(decals, repeated)
+    return decals
+
+
 def repeated_trees(tree: Node) -> tuple[Node, ...]:
     """Return a tree, then the same with its outermost repeat replaced by one copy, then the next, and so on.
 

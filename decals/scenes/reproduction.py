@@ -6,23 +6,27 @@ from typing import Any
 
 import numpy as np
 
+from blobtree import Node
 from blobtree.progress import Cancel, Progress
 from decals.errors import ImplicitDecalsError
 from decals.model import COLUMNS, Decals
+from decals.scattering.copies import on_all_copies, repeated_trees
 from decals.scattering.density import PaintedImage
 from decals.scattering.image_projections import Planar
 from decals.scattering.jitter import Jitter
 from decals.scattering.scatter import scatter
+from decals.scenes.objects import SceneObject, TreeObject
 from decals.scenes.provenance import changes_since, device_text, package_versions, provenance
 from decals.scenes.recipe import Recipe, shape_hash
 from decals.scenes.scene import Scene, require_scene
+from decals.surfaces.implicit import ImplicitSurface
 
 FUNCTIONS = ("decals.cover", "decals.scatter")
 """Functions of recipes whose decals can be made again."""
 
 UNUSED = (
     *("models", "view_direction", "up", "fov", "crease_angle", "orientation"),
-    *("painted", "painted_along", "black"),
+    *("painted", "painted_along", "black", "same_on_copies"),
 )
 """Parameters of recipes that are none of `decals.scatter`."""
 
@@ -98,10 +102,15 @@ def reproduce(
     if missing:
         return Reproduction(missing)
     objects = {item.name: item for item in scene.objects}
-    surfaces = [objects[name].surface for name in recipe.parameters["models"]]
+    models = [objects[name] for name in recipe.parameters["models"]]
+    tree = _tree_of_copies(recipe.parameters, models)
+    surfaces = (
+        [item.surface for item in models] if tree is None else [ImplicitSurface(repeated_trees(tree)[-1])]
+    )
     try:
         options = _options(recipe.parameters, surfaces)
         made = scatter(surfaces, seed=recipe.seed, progress=progress, cancel=cancel, **options)
+        made = made if tree is None else on_all_copies(made, tree)
     except (ImplicitDecalsError, TypeError) as error:
         return Reproduction((f"parameters that this version takes: {error}",))
     here = provenance(device_text(str(options.get("device") or "cpu")))
@@ -129,6 +138,12 @@ def _missing(scene: Scene, recipe: Recipe) -> list[str]:
     if recipe.result and scene.decals.content_hash != recipe.result:
         found.append("edits by hand: the decals of the scene are others than its recipe made")
     return found
+
+
+def _tree_of_copies(parameters: Mapping[str, Any], models: Sequence[SceneObject]) -> Node | None:
+    """Return the tree whose copies show the same decals, if a recipe says so."""
+    only = models[0] if len(models) == 1 else None
+    return only.tree if parameters.get("same_on_copies") and isinstance(only, TreeObject) else None
 
 
 def _options(parameters: Mapping[str, Any], surfaces: Sequence[Any]) -> dict[str, Any]:

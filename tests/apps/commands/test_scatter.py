@@ -155,7 +155,11 @@ def test_copies_of_a_grid_get_the_same_decals(folder: Path) -> None:
     expected = np.concatenate([one.decals.positions + place for place in places])
     np.testing.assert_allclose(scene.decals.positions, expected, atol=1e-5)
     assert len(scene.objects) == 1
-    assert scene.recipe is None  # it would scatter over all copies
+    assert reproduce(scene).equal
+    Image.fromarray(np.array([[0, 255]], np.uint8).repeat(8, axis=1)).save(folder / "half.png")
+    painted = ["--painted", "half.png", "--painted-along", "y", "--count", "20"]
+    assert run(["scatter", "grid.json", *painted, "--same-on-copies", "-o", "painted.json"]) == 0
+    assert reproduce(load_scene(folder / "painted.json")).equal
 
 
 def test_too_many_decals_on_copies_are_refused_before_work(folder: Path, capsys: Capture) -> None:

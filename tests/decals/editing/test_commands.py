@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blobtree import Repeat
-from decals import DecalImage, Decals, MeshObject, TreeObject, cover, scatter
+from decals import DecalImage, Decals, MeshObject, TreeObject, cover, reproduce, scatter
 from decals.editing import (
     AddDecals,
     AddImage,
@@ -184,6 +184,7 @@ def test_copies_of_a_repeat_below_transforms_show_the_same_decals() -> None:
     session.do(ScatterOnCopies((0,), 40, seed=5))
     alone = scatter(TREE.translate((0, 5, 0)).scale((2.0, 1.0, 1.0)), count=10, seed=5)
     _assert_repeated(session.document.decals.decals, alone, (12.0, 6.0))
+    assert reproduce(session.document.scene).equal
 
 
 def _assert_repeated(decals: Decals, alone: Decals, steps: tuple[float, float]) -> None:
