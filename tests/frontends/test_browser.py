@@ -20,7 +20,7 @@ NEEDED = ("playwright", "axe_playwright_python", "trame_pyvista")
 HTML_CHECKS = "picture", "sizes", "use", "mounts", "address", "losses", "drags", "refusals"
 FIREFOX_CHECKS = (
     *(f"in_html_page {check}" for check in HTML_CHECKS),
-    *(f"in_browser {check}" for check in ("sandbox", "keyboard")),
+    *(f"in_browser {check}" for check in ("sandbox", "keyboard", "copies", "access")),
     "in_lesson_page",
 )
 FIREFOX_DRIVER = 1, 60
