@@ -135,7 +135,7 @@ def scatter(
             raise InvalidInput(f"expected a scene with objects, {model[0]!r} has none; add one with `edit`")
         own = loaded.images if images is None and isinstance(loaded, Scene) else ()
         pictures = own or scale_images(images or 1)
-        trees = _repeated_trees(objects, model[0]) if same_on_copies else ()
+        trees = _repeated_trees(objects) if same_on_copies else ()
         surfaces = [ImplicitSurface(trees[-1])] if trees else [item.surface for item in objects]
         copies = math.prod(copy_count(tree) or 1 for tree in trees)
         if spacing is not None:
@@ -192,14 +192,14 @@ def scatter(
     print_path(output)
 
 
-def _repeated_trees(objects: Sequence[SceneObject], model: str) -> tuple[Node, ...]:
-    """Return the trees of the only model, see `repeated_trees`; InvalidInput without a repeat."""
+def _repeated_trees(objects: Sequence[SceneObject]) -> tuple[Node, ...]:
+    """Return the trees of the only object, see `repeated_trees`; InvalidInput without a repeat."""
     only = objects[0] if len(objects) == 1 else None
     trees = repeated_trees(only.tree) if isinstance(only, TreeObject) else ()
     if len(trees) < 2:
         raise InvalidInput(
-            f"--same-on-copies: expected one tree whose root is a Repeat or a PolarRepeat, got {model!r}; "
-            "leave the option out"
+            "--same-on-copies: expected one model, a tree whose root is a Repeat or a PolarRepeat, got "
+            f"{', '.join(item.name for item in objects)}; leave the option out"
         )
     return trees
 

@@ -22,6 +22,7 @@ from decals.images.canvas import (
     shine,
     smoothstep,
 )
+from decals.validation import instance, whole_number
 
 EYE_COLOR = rgb("#e0a11c")
 EYE_EDGE = 0.94
@@ -252,7 +253,6 @@ def is_builtin(reference: str) -> bool:
     return match is not None and match["name"] in _PAINTERS
 
 
-@lru_cache(maxsize=32)
 def generate_image(reference: str, size: int = 256) -> NDArray[np.uint8]:
     """Generate one of the built-in decal images.
 
@@ -289,8 +289,9 @@ def generate_image(reference: str, size: int = 256) -> NDArray[np.uint8]:
     >>> decals.images.generate_image("tile#b0413e", size=64).shape
     (64, 64, 4)
     """
+    instance("image", reference, str, InvalidImage, f"such as {BUILTIN_IMAGES[0]!r}")
     match = _REFERENCE.fullmatch(reference)
-    name, mark, color = reference.partition("#")
+    name, mark, _ = reference.partition("#")
     if match is None and mark and name in _PAINTERS:
         raise InvalidImage(
             f"expected a colour of six hexadecimal digits, such as {name + '#b0413e'!r}, got {reference!r}; "
@@ -299,9 +300,14 @@ def generate_image(reference: str, size: int = 256) -> NDArray[np.uint8]:
     if match is None or match["name"] not in _PAINTERS:
         names = ", ".join(BUILTIN_IMAGES)
         raise InvalidImage(f"expected one of the images {names} (or NAME#rrggbb), got {reference!r}")
-    if not 1 <= size <= MAX_GENERATED_EDGE:
-        raise InvalidImage(f"expected an image edge of 1 to {MAX_GENERATED_EDGE} pixels, got {size}")
-    paint, default = _PAINTERS[match["name"]]
+    return _drawn(reference, whole_number("size of an image", size, 1, MAX_GENERATED_EDGE, InvalidImage))
+
+
+@lru_cache(maxsize=32)
+def _drawn(reference: str, size: int) -> NDArray[np.uint8]:
+    """Return the image of a valid reference."""
+    name, _, color = reference.partition("#")
+    paint, default = _PAINTERS[name]
     base: Color = rgb(color) if color else default
     pixels = draw(partial(paint, base=base), size)
     pixels.flags.writeable = False

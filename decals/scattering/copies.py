@@ -18,11 +18,17 @@ from decals.validation import instance
 ON_SURFACE = 1e-3
 """Distance from the surface, in radii of a decal, up to which the decal keeps its place and its normal."""
 
-UNLIKE_SCALES = 1e-6
-"""Error of squared scales of the map from one copy to another, up to which it moves the copy alone."""
+FLOAT_STEPS = 4.0
+"""The same in steps of float32 at the decal, which are larger far from the origin."""
+
+OUTWARD = 4.0
+"""Step from a decal along its normal, in these distances, which leads out of the solid."""
 
 MAX_DISTANCE = 0.5
-"""Distance from the surface, in radii, beyond which a decal is left out: it lies inside another copy."""
+"""Distance from the surface, in radii, beyond which a decal is left out: blends and copies lie over it."""
+
+RIGID = 1e-6
+"""Largest difference from 1 of the squared scales of a map that only moves, turns or mirrors."""
 
 
 def on_copies(decals: Decals, repeat: Node) -> Decals:
@@ -30,8 +36,8 @@ def on_copies(decals: Decals, repeat: Node) -> Decals:
 
     The decals of each copy are those of the child, moved as the copy is. On a mirrored copy, places and the
     tops of images are mirrored; images are not. Where copies blend, decals are projected onto the blend.
-    Decals inside the blend, or in the crease between united copies, are left out. For a grid, a repeat of
-    repeats, call it for the inner one first.
+    Decals inside the blend, in the crease between united copies, or between solids that touch are left out.
+    For a grid, a repeat of repeats, call it for the inner one first.
 
     Parameters
     ----------
@@ -83,15 +89,20 @@ def on_copies(decals: Decals, repeat: Node) -> Decals:
     copies = Decals.concatenate(_moved(decals, matrix) for matrix in _placements(repeat))
     if len(copies) == 0:
         return copies
-    positions, normals = ImplicitSurface(repeat).project(copies.positions)
-    ways = np.linalg.norm(positions - copies.positions, axis=1) / copies.radii
-    moved = ways > ON_SURFACE
-    kept = np.flatnonzero((ways <= MAX_DISTANCE) & (~moved | _on_surface(repeat, positions, copies.radii)))
-    moved = moved[kept, None]
-    return copies[kept].replace(
-        positions=np.where(moved, positions[kept], copies.positions[kept]),
-        normals=np.where(moved, normals[kept], copies.normals[kept]),
-    )
+    slack = ON_SURFACE * copies.radii + FLOAT_STEPS * np.spacing(np.abs(copies.positions).max(axis=1))
+    stays = _on_surface(repeat, copies.positions, slack)
+    visible = repeat(copies.positions + OUTWARD * slack[:, None] * copies.normals) < ISO
+    unmoved = np.flatnonzero(stays & visible)
+    off = np.flatnonzero(~stays)
+    if len(off) == 0:
+        return copies[unmoved]
+    moved = copies[off]
+    positions, normals = ImplicitSurface(repeat).project(moved.positions)
+    near = np.linalg.norm(positions - moved.positions, axis=1) <= MAX_DISTANCE * moved.radii
+    kept = np.flatnonzero(near & _on_surface(repeat, positions, slack[off]))
+    moved = moved[kept].replace(positions=positions[kept], normals=normals[kept])
+    order = np.argsort(np.concatenate([unmoved, off[kept]]))
+    return Decals.concatenate([copies[unmoved], moved])[order]
 
 
 def on_all_copies(decals: Decals, tree: Node) -> Decals:
@@ -132,11 +143,11 @@ def _below_transforms(tree: Node) -> tuple[list[Transform], Node]:
     return transforms, tree
 
 
-def _on_surface(repeat: Node, positions: Float32Array, radii: Float32Array) -> NDArray[np.bool_]:
-    """Return False for projected points that are not on the surface, as in creases between united copies."""
+def _on_surface(repeat: Node, positions: Float32Array, slack: Float32Array) -> NDArray[np.bool_]:
+    """Return True for points within a distance of the surface; not for those in creases between copies."""
     gaps = np.abs(repeat(positions) - ISO)
     slopes = np.linalg.norm(repeat.gradient(positions), axis=1)
-    reached: NDArray[np.bool_] = gaps <= ON_SURFACE * radii * slopes
+    reached: NDArray[np.bool_] = gaps <= slack * slopes
     return reached
 
 
@@ -155,7 +166,7 @@ def _placements(tree: Node) -> list[Float64Array]:
         for copy in repeat.expanded.children
     ]
     squares = np.array([matrix[:, :3] @ matrix[:, :3].T for matrix in matrices])
-    if np.abs(squares - np.eye(3)).max() > UNLIKE_SCALES:
+    if np.abs(squares - np.eye(3)).max() > RIGID:
         raise InvalidScattering(
             "repeat: expected copies of one shape, got some that a transform scales in other directions than "
             "the first; scale by one factor"

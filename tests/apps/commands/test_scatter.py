@@ -175,7 +175,7 @@ def test_too_many_decals_on_copies_are_refused_before_work(folder: Path, capsys:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--same-on-copies", "-o", "a.json"], "expected one tree whose root is a Repeat"),
+        (["--same-on-copies", "-o", "a.json"], "expected one model, a tree whose root is a Repeat"),
         (["--same-on-copies", "--zone", "*", "-o", "a.json"], "leave one of them out"),
         (["--zone", "tail", "-o", "a.json"], "expected a name of the models, which have 'spheres'"),
         (["--zone", "*:taste=1", "-o", "a.json"], "expected WHERE:KEY=VALUE"),

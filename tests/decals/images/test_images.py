@@ -11,7 +11,15 @@ import decals
 from blobtree._typing import Float64Array
 from decals import load_image
 from decals.errors import InvalidImage, InvalidScene
-from decals.images import BUILTIN_IMAGES, MAX_IMAGE_EDGE, canvas, generate_image, image_pixels, read_image
+from decals.images import (
+    BUILTIN_IMAGES,
+    MAX_IMAGE_EDGE,
+    builtin,
+    canvas,
+    generate_image,
+    image_pixels,
+    read_image,
+)
 from decals.images import load as load_module
 from decals.images.load import each_image, embedded_image, is_embedded
 from decals.images.texels import as_bytes, linear_premultiplied
@@ -36,7 +44,7 @@ def test_any_size_is_rgba_and_repeats(name: str, size: int) -> None:
     image = generate_image(name, size)
     assert image.shape == (size, size, 4)
     assert image.dtype == np.uint8
-    generate_image.cache_clear()
+    builtin._drawn.cache_clear()
     assert np.array_equal(image, generate_image(name, size))
 
 
@@ -46,9 +54,9 @@ def test_images_drawn_in_bands_are_those_drawn_at_once(name: str, monkeypatch: p
     images = []
     for samples in (1, 5000, 1 << 20):  # bands of one row, of many, and all rows at once
         monkeypatch.setattr(canvas, "BAND_SAMPLES", samples)
-        generate_image.cache_clear()
+        builtin._drawn.cache_clear()
         images.append(generate_image(name, 33))
-    generate_image.cache_clear()
+    builtin._drawn.cache_clear()
     assert np.array_equal(images[0], images[2])
     assert np.array_equal(images[1], images[2])
 
@@ -137,10 +145,16 @@ def test_a_file_may_be_named_like_an_image_with_a_wrong_colour(tmp_path: Path) -
     assert load_image("tile#1", folder=tmp_path).shape == (3, 2, 4)
 
 
-@pytest.mark.parametrize("size", [0, -1, 5000])
-def test_absurd_sizes_are_refused(size: int) -> None:
+@pytest.mark.parametrize("size", [0, -1, 5000, 2.5, "64", None, True])
+def test_absurd_sizes_are_refused(size: Any) -> None:
     with pytest.raises(InvalidImage, match="1 to 4096"):
         generate_image("tile", size)
+
+
+@pytest.mark.parametrize("name", [b"scale", 3, None, ["tile"]])
+def test_names_that_are_no_texts_are_refused(name: Any) -> None:
+    with pytest.raises(InvalidImage, match=r"image: expected a str, got .*; such as 'eye'"):
+        generate_image(name)
 
 
 def test_generated_pixels_are_read_only() -> None:

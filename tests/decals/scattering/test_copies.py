@@ -145,6 +145,28 @@ def test_the_trees_of_a_grid_below_transforms_end_at_its_child() -> None:
     assert repeated_trees(STONE) == (STONE,)
 
 
+def test_copies_apart_keep_every_decal_however_many_and_far_they_are() -> None:
+    ball = Point((0, 0, 0), radius=0.5)
+    marks = scatter(ball, count=30)
+    for step in (2.0, 100.0):
+        everywhere = on_copies(marks, Repeat(ball, (step, 0, 0), 100))
+        offsets = np.arange(100)[:, None, None] * [step, 0.0, 0.0]
+        assert_allclose(everywhere.positions, (marks.positions + offsets).reshape(-1, 3), atol=1e-3)
+
+
+def test_decals_between_solids_that_touch_are_left_out() -> None:
+    crate = Box((0, 0, 0), (1, 1, 1), radius=0)
+    marks = scatter(crate, count=60, sizing="touching")
+    hidden = np.abs(marks.positions[:, 0]) > 0.4999
+    row = on_copies(marks, Repeat(crate, (1, 0, 0), 4, "union"))
+    outermost = (np.abs(row.positions[:, 0] - 1.5) > 1.9999).sum()
+    assert outermost == hidden.sum()  # one end of the first crate, and one of the last
+    assert not ((np.abs(row.positions[:, 0] % 1.0 - 0.5) < 1e-4) & (np.abs(row.normals[:, 0]) > 0.9))[
+        np.abs(row.positions[:, 0] - 1.5) < 1.9
+    ].any()
+    assert len(row) >= 4 * (len(marks) - hidden.sum()) + outermost - 6
+
+
 def test_nothing_stays_nothing() -> None:
     assert len(on_copies(Decals.empty(), APART["row"])) == 0
 
