@@ -41,6 +41,12 @@ EMPTY = -3
 
 The entry of another block is SURELY_INSIDE, or the texel in front of its tape, which is not negative."""
 
+LONGEST_WAY = 1000.0
+"""Longest step, in tolerances, along a ray that grazes the surface."""
+
+ARRIVED = 0.02
+"""Share of the first distance from the surface, below which such a ray has arrived there."""
+
 HIT_STEPS = 4
 HIT_GAP = 1e-3
 """Field values from the surface at which Newton's method ends, and its most steps, for a hit."""
@@ -166,7 +172,9 @@ def first_hit(
                         break
                     q += slope * ((ISO - f[0]) / (steepness * steepness))
                 if at_surface:
-                    return t + newton_step(gap, rise, tolerance)
+                    return t + way_to_surface(
+                        origin + direction * t, direction, gap, rise, tolerance, tape, span
+                    )
             free = wp.max(free, tolerance * wp.max(1.0, float(step) / STEPS_PER_TOLERANCE))
         t += free
         last_gap = gap
@@ -176,11 +184,35 @@ def first_hit(
 
 
 @wp.func
-def newton_step(gap: wp.float32, rise: wp.float32, tolerance: wp.float32) -> wp.float32:
-    """Return gap / rise, or 0 if that is 2 tolerances or more."""
-    if rise * tolerance * 2.0 <= gap:
-        return 0.0
-    return gap / rise
+def way_to_surface(
+    point: wp.vec3,
+    direction: wp.vec3,
+    gap: wp.float32,
+    rise: wp.float32,
+    tolerance: wp.float32,
+    tape: Texels,
+    span: wp.vec2i,
+) -> wp.float32:
+    """Return the way along a ray from a point within a tolerance of the surface to the surface.
+
+    Newton's method finds it: one step of less than 2 tolerances, or a few longer ones where the ray grazes
+    the surface. The way is 0 where these do not arrive, as on a ray that passes beside a round surface.
+    """
+    if gap < rise * tolerance * 2.0:
+        return gap / rise
+    way = float(0.0)
+    left = gap
+    slope = rise
+    for _step in range(HIT_STEPS):
+        if wp.abs(left) > slope * tolerance * LONGEST_WAY:
+            return 0.0
+        way += left / slope
+        f = field_gradient(point + direction * way, tape, span)
+        left = ISO - f[0]
+        slope = wp.dot(wp.vec3(f[1], f[2], f[3]), direction)
+        if wp.abs(left) <= ARRIVED * gap:
+            return wp.max(way, 0.0)
+    return 0.0
 
 
 @wp.func

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from blobtree import Cone, Node, Point, Segment
+from blobtree import Box, Cone, Node, Point, Segment
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.errors import InvalidPoints
 from blobtree.tracing.ray_kernels import MAX_DISTANCE, box_interval, exit_distance, reciprocal
@@ -180,6 +180,28 @@ def test_raycast_returns_position_normal_and_color() -> None:
 # -- unusual rays ------------------------------------------------------------------------
 
 BALL = Point((0, 0, 0), radius=1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("width", [None, 0.2])
+def test_rays_end_on_the_faces_of_a_sharp_box_at_all_angles(seed: int, width: float | None) -> None:
+    rng = np.random.default_rng(seed)
+    half = rng.uniform(0.5, 2.0, 3)
+    origins = 6.0 * random_units(rng, 2000)
+    directions = rng.uniform(-1.2, 1.2, (2000, 3)) * half - origins
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    sides = np.stack([(sign * half - origins) / directions for sign in (-1.0, 1.0)])
+    enter, leave = sides.min(axis=0).max(axis=1), sides.max(axis=0).min(axis=1)
+    box = Box((0, 0, 0), tuple((2.0 * half).tolist()), radius=0, width=width)
+    distances = box.raycast(origins, directions).distances.astype(np.float64)
+    hit = np.isfinite(distances)
+    clear = np.abs(leave - enter) > 1e-3  # others pass by an edge
+    np.testing.assert_array_equal(hit[clear], (enter < leave)[clear])
+    rows = np.flatnonzero(hit & clear)
+    points = origins[rows] + distances[rows, None] * directions[rows]
+    outside = (np.abs(points) - half).max(axis=1)
+    assert (np.abs(outside) < 2e-6).mean() > 0.998  # without a step along the ray 0.85
+    assert np.quantile(np.abs(distances[rows] - enter[rows]), 0.998) < 1e-4
 
 
 def test_a_ray_that_starts_inside_hits_at_once() -> None:
