@@ -47,7 +47,8 @@ def to_sdf(tree: ImplicitModel, points: ArrayLike, *, resolution: int = 64) -> S
     """Return the signed distances of points from the surface of a tree.
 
     Distances are measured to a mesh of the surface. Parts of the surface that are thinner than a cell of the
-    mesh may be missed. The error falls with the square of the resolution.
+    mesh may be missed, such as the tip of a cone: there, errors may be a few times the stated one. The error
+    falls with the square of the resolution.
 
     Parameters
     ----------

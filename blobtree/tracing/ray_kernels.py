@@ -41,8 +41,8 @@ EMPTY = -3
 
 The entry of another block is SURELY_INSIDE, or the texel in front of its tape, which is not negative."""
 
-LONGEST_WAY = 1000.0
-"""Longest step, in tolerances, along a ray that grazes the surface."""
+GRAZING_STEPS, LONGEST_WAY = 2, 1000.0
+"""Most steps along a ray that grazes the surface, and the longest of them, in tolerances."""
 
 ARRIVED = 0.02
 """Share of the first distance from the surface, below which such a ray has arrived there."""
@@ -203,7 +203,7 @@ def way_to_surface(
     way = float(0.0)
     left = gap
     slope = rise
-    for _step in range(HIT_STEPS):
+    for _step in range(GRAZING_STEPS):
         if wp.abs(left) > slope * tolerance * LONGEST_WAY:
             return 0.0
         way += left / slope

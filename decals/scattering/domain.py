@@ -461,4 +461,9 @@ def checked_values(
         raise InvalidScattering(
             f"{name}: expected finite numbers, and densities above zero; bar regions by a mask"
         )
+    if truths and (others := values[(values != 0.0) & (values != 1.0)]).size:
+        raise InvalidScattering(
+            f"{name}: expected True or False for each point, got {others[0]:g}; compare numbers, as in "
+            "`points[:, 2] > 0`"
+        )
     return values

@@ -55,7 +55,10 @@ def gap_widths(decals: Decals, points: Float32Array, normals: Float32Array) -> F
 def _nearest(
     decals: Decals, points: Float32Array, normals: Float32Array, indices: Int64Array
 ) -> Float64Array:
-    """Return the least distance of each point from the rims of some decals, -1 for none: ``float64[m]``."""
+    """Return the least distance of each point from the rims of some decals, ``float64[m]``.
+
+    The indices are -1 where there is no further decal; without any, the distance is infinite.
+    """
     rows, columns = np.nonzero(indices >= 0)
     found = indices[rows, columns]
     offsets = points[rows].astype(np.float64) - decals.positions[found]

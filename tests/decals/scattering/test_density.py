@@ -118,6 +118,7 @@ def test_mask() -> None:
         ({"density": lambda points: points[:, 0] * np.nan}, "density: expected finite"),
         ({"density": lambda points: "much"}, "density: expected numbers"),
         ({"mask": lambda points: True}, "mask: expected shape"),
+        ({"mask": lambda points: points[:, 0]}, "mask: expected True or False for each point, got .*compare"),
     ],
 )
 def test_invalid_density_and_mask_values_raise(options: dict[str, Any], message: str) -> None:
