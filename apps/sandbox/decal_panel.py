@@ -50,9 +50,7 @@ COLUMNS = {
 
 ZONE, COPIES = "zone_density", "same_on_copies"
 SCATTER = {**options_of(scatter), ZONE: options_of(ZoneActions.scatter)[ZONE]}
-COPIES_DOC = (
-    "put the decals of one copy of a repeat on all of its copies, which share the count; not for zones"
-)
+COPIES_DOC = "put the decals of one copy of a repeat on all copies, which share the count; not for zones"
 SCATTER |= {COPIES: Option(COPIES, bool, COPIES_DOC, Values(label="same decals on all copies"), False, False)}
 """Options of the next scattering beside the images; the last ones are for zones, and for repeats, alone."""
 
