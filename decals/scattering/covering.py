@@ -84,6 +84,9 @@ TRIALS_PER_PEAK = 2
 TRIAL_SPREADS = (1.0, 0.4)
 """Standard deviation of the random points of each round, in mean distances of the samples."""
 
+TRIALS_BESIDE_SHEETS, SPREAD_BESIDE_SHEETS = 64, 0.6
+"""Number and spread, in mean distances of the samples, of random points around each sample that lies beyond
+the sheet of a nearer decal. Other decals own small pieces there, far from the rest of their cells."""
 
 LEAST_BEND = 0.05
 """Least sine between the normals of two faces whose edge is searched along."""
@@ -215,6 +218,13 @@ def covering_radii(
     first = first.joined(centers.find(projected([spikes], sample_distance, project)))
     _grow(radii, first, limits)
     rng = np.random.default_rng(seed)
+    if decals.heights is not None:
+        beyond = first.points[np.flatnonzero(first.doubts == 0.0)]
+        beside = random_points_around(
+            beyond, TRIALS_BESIDE_SHEETS, SPREAD_BESIDE_SHEETS * sample_distance, rng
+        )
+        first = first.joined(centers.find(project(beside)[0]))
+        _grow(radii, first, limits)
     owned = first.peaks(PEAK_FRACTION * radii)
     owned = owned.joined(centers.find(project(circumcenters(owned, decals))[0]))
     _grow(radii, owned, limits)

@@ -255,7 +255,8 @@ class FacingTree:
     ) -> tuple[Float64Array, Int64Array, Float32Array]:
         """Return what `nearest` does, and how little decides which of the examined points face each, ``[n]``.
 
-        That is the least difference of a cosine between the normals from `FACING_LIMIT`.
+        That is the least difference of a cosine between the normals from `FACING_LIMIT`. It is 0 where a
+        point nearer than the nearest facing one would face it, but keeps to another sheet.
         """
         distances = np.full((len(points), count), np.inf)
         indices = np.full((len(points), count), -1, np.int64)
@@ -320,17 +321,21 @@ class FacingTree:
         indices = np.where(within, indices, 0)
         cosines = np.einsum("nki,ni->nk", self._normals[indices], normals)
         facing = within & (cosines > FACING_LIMIT)
+        margins = np.abs(cosines - FACING_LIMIT)
         if self._heights is not None:
             offsets = points[:, None] - self._tree.data[indices]
             products = sheet_products(offsets, self._normals[indices], normals)
-            facing &= products <= self._heights[indices] ** 2
+            beyond = facing & (products > self._heights[indices] ** 2)
+            facing &= ~beyond
+            nearer = distances <= np.where(facing, distances, np.inf).min(axis=1, keepdims=True)
+            margins[beyond & nearer] = 0.0
         if own is not None:
             facing &= indices != own[:, None]
         order = np.argsort(~facing, axis=1, kind="stable")
         facing = np.take_along_axis(facing, order, axis=1)
         distances = np.where(facing, np.take_along_axis(distances, order, axis=1), np.inf)
         indices = np.where(facing, np.take_along_axis(indices, order, axis=1), -1)
-        doubts = np.where(within, np.abs(cosines - FACING_LIMIT), np.inf).min(axis=1)
+        doubts = np.where(within, margins, np.inf).min(axis=1)
         return distances, indices, doubts, within[:, -1]
 
 

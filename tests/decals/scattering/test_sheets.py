@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import decals
+from decals.scattering.neighbors import FacingTree
 from decals.surfaces import MeshSurface
 from tests.decals.distortion import random_points
+from tests.decals.family_models import model_of
 from tests.decals.fault_models import Arrays, joined
 from tests.decals.meshes import icosphere
 from tests.decals.shapes import sheet_faces
@@ -58,3 +60,23 @@ def test_parallel_plates_have_decals_of_their_own() -> None:
 def test_one_sheet_has_plain_decals() -> None:
     layout = decals.scatter(MeshSurface(*icosphere(3)), count=40)
     assert not layout.single_sheets.any()
+
+
+def test_a_point_beyond_the_sheet_of_the_nearest_decal_is_in_doubt() -> None:
+    """Those whose owner is nearer, or that no such decal would face, are not."""
+    centers = np.array([[0, 0, 0], [2, 0, 0]], np.float32)
+    up = np.array([[0, 0, 1]], np.float32)
+    points = np.array([[0, 0, 0.5], [0, 0, 0.1], [1.9, 0, 0.5], [0, 0, 0.5]], np.float32)
+    normals = np.concatenate([up, up, up, -up])
+    tree = FacingTree(centers, up.repeat(2, axis=0), np.array([0.2, np.inf]))
+    _, owners, doubts = tree.nearest_and_doubts(points, normals)
+    assert owners[:, 0].tolist() == [1, 0, 1, -1]
+    assert (doubts == 0.0).tolist() == [True, False, False, False]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["patches-27", "patches-75"])
+def test_no_point_is_bare_where_sheets_cross(name: str) -> None:
+    scene = decals.cover(model_of(name, 1), count=1000)
+    assert scene.decals.single_sheets.any()
+    assert scene.measure(samples=200_000).coverage == 1.0
