@@ -1,6 +1,5 @@
 """``implicit-decals scatter``: scattered decals as a scene, or as a table."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -30,7 +29,7 @@ from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing
 from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar
-from decals.scattering.copies import copy_count, on_all_copies, repeated_trees
+from decals.scattering.copies import has_copies, on_all_copies, one_copy
 from decals.scattering.neighbors import ideal_spacing
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.scenes.recipe import Recipe
@@ -135,9 +134,9 @@ def scatter(
             raise InvalidInput(f"expected a scene with objects, {model[0]!r} has none; add one with `edit`")
         own = loaded.images if images is None and isinstance(loaded, Scene) else ()
         pictures = own or scale_images(images or 1)
-        trees = _repeated_trees(objects) if same_on_copies else ()
-        surfaces = [ImplicitSurface(trees[-1])] if trees else [item.surface for item in objects]
-        copies = math.prod(copy_count(tree) or 1 for tree in trees)
+        tree = _tree_of_copies(objects) if same_on_copies else None
+        one, copies = (None, 1) if tree is None else one_copy(tree)
+        surfaces = [item.surface for item in objects] if one is None else [ImplicitSurface(one)]
         if spacing is not None:
             _check_spacing(spacing, copies * sum(surface.area for surface in surfaces))
         density = None
@@ -170,10 +169,14 @@ def scatter(
                 f"each of {copies:,}; take fewer"
             )
         decals = scatter_decals(
-            surfaces if trees else list(objects), density=density, seed=seed, progress=progress, **options
+            list(objects) if tree is None else surfaces,
+            density=density,
+            seed=seed,
+            progress=progress,
+            **options,
         )
-        if trees:
-            decals = on_all_copies(decals, trees[0])
+        if tree is not None:
+            decals = on_all_copies(decals, tree)
         if output.suffix.lower() in TABLE_SUFFIXES:
             save_table(decals, output, images=own, origin=objects[0].origin)
         else:
@@ -183,7 +186,7 @@ def scatter(
                 camera, drawing = frame(objects, parse_view(None, axes_of(model[0])), ASPECT), Drawing()
             if painted is not None:
                 options |= {"painted": str(painted), "painted_along": painted_along, "black": black}
-            if trees:
+            if same_on_copies:
                 options["same_on_copies"] = True
             names = [item.name for item in objects]
             recipe = Recipe.of("decals.scatter", seed=seed, models=names, **options).giving(decals, objects)
@@ -192,16 +195,15 @@ def scatter(
     print_path(output)
 
 
-def _repeated_trees(objects: Sequence[SceneObject]) -> tuple[Node, ...]:
-    """Return the trees of the only object, see `repeated_trees`; InvalidInput without a repeat."""
+def _tree_of_copies(objects: Sequence[SceneObject]) -> Node:
+    """Return the tree of the only object; InvalidInput if it does not consist of copies."""
     only = objects[0] if len(objects) == 1 else None
-    trees = repeated_trees(only.tree) if isinstance(only, TreeObject) else ()
-    if len(trees) < 2:
+    if not isinstance(only, TreeObject) or not has_copies(only.tree):
         raise InvalidInput(
             "--same-on-copies: expected one model, a tree whose root is a Repeat or a PolarRepeat, got "
             f"{', '.join(item.name for item in objects)}; leave the option out"
         )
-    return trees
+    return only.tree
 
 
 def _check_spacing(spacing: float, area: float) -> None:

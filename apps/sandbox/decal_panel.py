@@ -23,7 +23,7 @@ from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Decals
 from decals.options import Option, Values, arguments_of, described, options_of, values_of
 from decals.receivers import labels_of
 from decals.rendering.options import Drawing
-from decals.scattering.copies import copy_count
+from decals.scattering.copies import has_copies
 from decals.scattering.scatter import scatter
 from decals.scenes.material import DecalMaterial
 from decals.scenes.objects import TreeObject
@@ -203,7 +203,7 @@ def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool, **_other
 def scatter_values(document: Document, chosen: dict[str, Any]) -> dict[str, Any]:
     """Return the options of the next scattering: those that were chosen, else the first ones."""
     trees = [item.tree for item in document.objects if isinstance(item, TreeObject)]
-    left_out = NOT_OF_SCATTER if any(map(copy_count, trees)) else (*NOT_OF_SCATTER, COPIES)
+    left_out = NOT_OF_SCATTER if any(map(has_copies, trees)) else (*NOT_OF_SCATTER, COPIES)
     first = {name: option.default for name, option in SCATTER.items() if name not in left_out}
     first |= {"images": (), "count": len(document.decals) or FIRST_DECAL_COUNT}
     return first | {name: value for name, value in chosen.items() if name in first}

@@ -7,7 +7,7 @@ from dataclasses import replace
 from blobtree.progress import Progress
 from decals.editing.scatter_commands import MAX_SCATTERED_DECALS, ReplaceDecals, ScatterDecals
 from decals.errors import InvalidEdit
-from decals.scattering.copies import copy_count, on_all_copies, repeated_trees
+from decals.scattering.copies import has_copies, on_all_copies, one_copy
 from decals.scenes.objects import SceneObject, TreeObject
 
 
@@ -61,24 +61,23 @@ class ScatterOnCopies(ScatterDecals):
             raise InvalidEdit("mask: expected none for the same decals on all copies; leave it out")
         covered = self.covered(objects)
         item = covered[0] if len(covered) == 1 else None
-        trees = repeated_trees(item.tree) if isinstance(item, TreeObject) else ()
-        if item is None or len(trees) < 2:
+        if not isinstance(item, TreeObject) or not has_copies(item.tree):
             names = ", ".join(item.name for item in covered) or "none"
             raise InvalidEdit(
                 "same decals on all copies: expected one object whose root is a Repeat or a PolarRepeat, got "
                 f"{names}; select such an object, or leave this out"
             )
-        copies = math.prod(copy_count(tree) or 1 for tree in trees)
+        one, copies = one_copy(item.tree)
         each = math.ceil(self.count / copies)
         if each * copies > MAX_SCATTERED_DECALS:
             raise InvalidEdit(
                 f"same decals on all copies: expected at most {MAX_SCATTERED_DECALS:,} together, got "
                 f"{each:,} on each of {copies:,} copies; take fewer"
             )
-        one = TreeObject(item.name, trees[-1], origin=item.origin)
+        only = TreeObject(item.name, one, origin=item.origin)
         on_one = ScatterDecals((0,), each, self.seed, self.options)
-        made = on_one.compute_command((one,), images, progress=progress, cancel=cancel)
-        decals = on_all_copies(made.decals, trees[0])
+        made = on_one.compute_command((only,), images, progress=progress, cancel=cancel)
+        decals = on_all_copies(made.decals, item.tree)
         assert made.recipe is not None
         parameters = {**made.recipe.parameters, "same_on_copies": True}
         recipe = replace(made.recipe, parameters=parameters).giving(decals, covered)

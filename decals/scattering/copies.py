@@ -1,5 +1,6 @@
 """`on_copies`: the decals of one copy of a repeat on all of its copies."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -78,7 +79,7 @@ def on_copies(decals: Decals, repeat: Node) -> Decals:
     (160, [5.0, 0.0, 0.0])
     """
     instance("decals", decals, Decals, InvalidDecals, "scatter returns some")
-    count = copy_count(repeat)
+    count = _copy_count(repeat)
     if count is None:
         raise InvalidScattering(f"repeat: expected a Repeat or a PolarRepeat, got {describe(repeat)}")
     if len(decals) * count > MAX_PARTICLES:
@@ -106,29 +107,40 @@ def on_copies(decals: Decals, repeat: Node) -> Decals:
 
 
 def on_all_copies(decals: Decals, tree: Node) -> Decals:
-    """Return decals of one copy on all copies of a tree; `decals` lie on the last of `repeated_trees`."""
-    for repeated in repeated_trees(tree)[-2::-1]:
-        decals = on_copies(decals, repeated)
+    """Return the decals of `one_copy` of a tree on all its copies."""
+    for repeat in reversed(_repeats(tree)[0]):
+        decals = on_copies(decals, repeat)
     return decals
 
 
-def repeated_trees(tree: Node) -> tuple[Node, ...]:
-    """Return a tree, then the same with its outermost repeat replaced by one copy, then the next, and so on.
+def has_copies(tree: Node) -> bool:
+    """Return True for a repeat, also one below transforms."""
+    return _copy_count(tree) is not None
 
-    Repeats count whose parents are repeats and transforms alone. Without any, the tree is the only one.
+
+def one_copy(tree: Node) -> tuple[Node, int]:
+    """Return one of the copies that a tree consists of, and their number; for another tree, itself and 1.
+
+    Repeats count whose parents are repeats and transforms alone. The copy is below these transforms.
     """
-    trees = [tree]
+    repeats, one = _repeats(tree)
+    return one, math.prod(_copy_count(repeat) or 1 for repeat in repeats)
+
+
+def _repeats(tree: Node) -> tuple[list[Node], Node]:
+    """Return a tree, the same with its outermost repeat replaced by one copy, and so on; the last apart."""
+    repeats = list[Node]()
     while True:
-        transforms, node = _below_transforms(trees[-1])
+        transforms, node = _below_transforms(tree)
         if not isinstance(node, Repeat | PolarRepeat):
-            return tuple(trees)
-        one = node.child
+            return repeats, tree
+        repeats.append(tree)
+        tree = node.child
         for transform in reversed(transforms):
-            one = replace(transform, child=one)
-        trees.append(one)
+            tree = replace(transform, child=tree)
 
 
-def copy_count(tree: Node) -> int | None:
+def _copy_count(tree: Node) -> int | None:
     """Return the number of copies of the repeat that a tree is below its transforms; None without one."""
     node = _below_transforms(tree)[1]
     return node.count if isinstance(node, Repeat | PolarRepeat) else None

@@ -10,7 +10,7 @@ from blobtree import Node
 from blobtree.progress import Cancel, Progress
 from decals.errors import ImplicitDecalsError
 from decals.model import COLUMNS, Decals
-from decals.scattering.copies import on_all_copies, repeated_trees
+from decals.scattering.copies import on_all_copies, one_copy
 from decals.scattering.density import PaintedImage
 from decals.scattering.image_projections import Planar
 from decals.scattering.jitter import Jitter
@@ -104,9 +104,7 @@ def reproduce(
     objects = {item.name: item for item in scene.objects}
     models = [objects[name] for name in recipe.parameters["models"]]
     tree = _tree_of_copies(recipe.parameters, models)
-    surfaces = (
-        [item.surface for item in models] if tree is None else [ImplicitSurface(repeated_trees(tree)[-1])]
-    )
+    surfaces = [item.surface for item in models] if tree is None else [ImplicitSurface(one_copy(tree)[0])]
     try:
         options = _options(recipe.parameters, surfaces)
         made = scatter(surfaces, seed=recipe.seed, progress=progress, cancel=cancel, **options)

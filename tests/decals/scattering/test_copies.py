@@ -11,7 +11,7 @@ from blobtree import Box, EndlessRepeat, Node, Point, PolarRepeat, Repeat, Trans
 from decals import Decals, evaluate, scatter
 from decals.errors import InvalidDecals, InvalidScattering
 from decals.scattering import on_copies
-from decals.scattering.copies import copy_count, repeated_trees
+from decals.scattering.copies import has_copies, on_all_copies, one_copy
 from decals.surfaces import ImplicitSurface
 from tests.vectors import random_units
 
@@ -115,9 +115,9 @@ def test_a_repeat_below_transforms_gets_the_decals_moved_as_it_is(name: str, see
     found, expected = on_copies(moved(marks), tree), moved(on_copies(marks, repeat))
     for field, error in (("positions", 1e-4), ("normals", 1e-4), ("tangents", 1e-4), ("radii", 1e-5)):
         assert_allclose(getattr(found, field), getattr(expected, field), atol=error)
-    trees = repeated_trees(tree)
-    assert [copy_count(one) for one in trees] == [len(repeat.expanded.children), None]
-    assert_allclose(trees[1](moved(marks).positions), 0.5, atol=1e-3)
+    one, copies = one_copy(tree)
+    assert copies == len(repeat.expanded.children)
+    assert_allclose(one(moved(marks).positions), 0.5, atol=1e-3)
 
 
 def _turn(axis: Any, angle: float) -> Any:
@@ -129,20 +129,24 @@ def _turn(axis: Any, angle: float) -> Any:
 def test_transforms_may_stretch_a_row_but_not_a_ring() -> None:
     row, ring = APART["row"], APART["ring"]
     stretched = row.scale((1.0, 2.0, 1.0))
-    marks = scatter(repeated_trees(stretched)[1], count=24)
+    marks = scatter(one_copy(stretched)[0], count=24)
     everywhere = on_copies(marks, stretched)
     assert_allclose(everywhere.positions[48:] - marks.positions, [[4.0, 2.0, 0.0]] * 24, atol=1e-5)
     with pytest.raises(InvalidScattering, match="expected copies of one shape"):
         on_copies(marks, ring.scale((1.0, 2.0, 1.0)))
 
 
-def test_the_trees_of_a_grid_below_transforms_end_at_its_child() -> None:
+def test_one_copy_of_a_grid_is_below_its_transforms() -> None:
     row = Repeat(STONE, (2, 0, 0), 2).translate((0, 1, 0))
     grid = Repeat(row, (0, 2, 0), 3).scale(2.0)
-    trees = repeated_trees(grid)
-    assert [copy_count(tree) for tree in trees] == [3, 2, None]
-    assert trees == (grid, row.scale(2.0), STONE.translate((0, 1, 0)).scale(2.0))
-    assert repeated_trees(STONE) == (STONE,)
+    one, copies = one_copy(grid)
+    assert one == STONE.translate((0, 1, 0)).scale(2.0)
+    assert copies == 6
+    assert has_copies(grid)
+    assert not has_copies(one)
+    everywhere = on_all_copies(scatter(one, count=10), grid)
+    assert_allclose(everywhere.positions[-10:] - everywhere.positions[:10], [[4.0, 8.0, 0.0]] * 10, atol=1e-5)
+    assert one_copy(STONE) == (STONE, 1)
 
 
 def test_copies_apart_keep_every_decal_however_many_and_far_they_are() -> None:
