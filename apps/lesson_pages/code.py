@@ -133,7 +133,7 @@ def access(path: str) -> dict[str, "Code"]:
     read, write = {
         "contact": ("p.viewer.mode", "p.viewer.set({ mode: value })"),
         "stiffness": ("p.viewer.stiffness", "p.viewer.set({ stiffness: value })"),
-        "mapping": ("undefined", "p.map(value)"),  # its choice says it
+        "mapping": ("undefined", "p.map(value)"),  # the choice shows the value
         **{
             f"probe.{axis}": (f"p.probe[{i}]", f"p.moveProbe(p.probe.with({i}, value))")
             for i, axis in enumerate(AXES)

@@ -1,6 +1,6 @@
 // Scores of puzzles, of which the browser keeps the least, and links to puzzles.
 
-// Return the least score of a key so far, Infinity for none; one that is not null may be the new least.
+// Return the least score of a key, Infinity without any. The given score counts too, unless it is null.
 export function best(key, score) {
   let least = score ?? Infinity;
   try {

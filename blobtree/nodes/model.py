@@ -94,9 +94,8 @@ class Model(ImplicitModel):
     ) -> Hits:
         """Return the first intersections of rays with the surface.
 
-        Newton's method takes hits to the surface, up to about 1e-6 of the model's diagonal. Where it does not
-        arrive, as on rays that pass beside an edge or a round surface, they are at most 1e-5 of the diagonal
-        away.
+        Newton's method takes hits to the surface, up to about 1e-6 of the model's diagonal. Rays that pass
+        beside an edge or a round surface hit as well, within about 1e-5 of the diagonal of `support`.
 
         Parameters
         ----------

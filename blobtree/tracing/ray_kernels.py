@@ -195,8 +195,8 @@ def way_to_surface(
 ) -> wp.float32:
     """Return the way along a ray from a point within a tolerance of the surface to the surface.
 
-    Newton's method finds it: one step of less than 2 tolerances, or a few longer ones where the ray grazes
-    the surface. The way is 0 where these do not arrive, as on a ray that passes beside a round surface.
+    Newton's method finds it: by one step of less than 2 tolerances, or by `GRAZING_STEPS` longer ones. The
+    way is 0 where these do not arrive, as on a ray that passes beside a round surface.
     """
     if gap < rise * tolerance * 2.0:
         return gap / rise

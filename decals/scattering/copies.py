@@ -23,10 +23,10 @@ FLOAT_STEPS = 4.0
 """The same in steps of float32 at the decal, which are larger far from the origin."""
 
 OUTWARD = 4.0
-"""Step from a decal along its normal, in these distances, which leads out of the solid."""
+"""Length of a step along a decal's normal, in these distances. It ends outside or in another copy."""
 
 MAX_DISTANCE = 0.5
-"""Distance from the surface, in radii, beyond which a decal is left out: blends and copies lie over it."""
+"""Distance from the surface, in radii, beyond which a decal is left out: a blend or a copy covers it."""
 
 RIGID = 1e-6
 """Largest difference from 1 of the squared scales of a map that only moves, turns or mirrors."""
@@ -59,7 +59,7 @@ def on_copies(decals: Decals, repeat: Node) -> Decals:
     InvalidDecals
         `decals` are not `Decals`.
     InvalidScattering
-        `repeat` is another node, a transform gives its copies unlike shapes, or there would be more than
+        `repeat` is another node, a transform gives its copies different shapes, or there would be more than
         100,000,000 decals.
     InvalidMesh
         The repeat has no surface.
@@ -128,7 +128,11 @@ def one_copy(tree: Node) -> tuple[Node, int]:
 
 
 def _repeats(tree: Node) -> tuple[list[Node], Node]:
-    """Return a tree, the same with its outermost repeat replaced by one copy, and so on; the last apart."""
+    """Return the repeats of a tree, the outermost first, and one copy.
+
+    The first repeat is the tree. Each next one is the one before with its outermost repeat replaced by one
+    copy of that. The copy is what remains.
+    """
     repeats = list[Node]()
     while True:
         transforms, node = _below_transforms(tree)

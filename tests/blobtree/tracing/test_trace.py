@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from blobtree import Box, Cone, Node, Point, Segment
+from blobtree import Box, Cone, Node, Point, Prism, Repeat, Segment, Torus
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.errors import InvalidPoints
 from blobtree.tracing.ray_kernels import MAX_DISTANCE, box_interval, exit_distance, reciprocal
@@ -202,6 +202,33 @@ def test_rays_end_on_the_faces_of_a_sharp_box_at_all_angles(seed: int, width: fl
     outside = (np.abs(points) - half).max(axis=1)
     assert (np.abs(outside) < 2e-6).mean() > 0.998  # without a step along the ray 0.85
     assert np.quantile(np.abs(distances[rows] - enter[rows]), 0.998) < 1e-4
+
+
+FLAT_SOLIDS: dict[str, Node] = {
+    "difference": Box((0, 0, 0), (2, 2, 2), radius=0) - Point((1, 1, 1), radius=0.8),
+    "union": Box((0, 0, 0), (2, 0.5, 0.5), radius=0) | Box((0, 0, 0), (0.5, 2, 0.5), radius=0),
+    "intersection": Box((0, 0, 0), (2, 2, 2), radius=0) & Point((0, 0, 0), radius=1.3),
+    "turned": Box((0, 0, 0), (2, 1, 0.4), radius=0).rotate((1, 2, 3), 40),
+    "scaled": Box((0, 0, 0), (2, 2, 2), radius=0).scale((1, 0.2, 3)),
+    "prism": Prism(((-1, -0.5, 0.5), (1, -0.5, 0.5), (0, -0.5, 1.2)), 1.0),
+    "row": Repeat(Box((0, 0, 0), (1, 1, 1), radius=0), (1.5, 0, 0), 6),
+    "torus": Torus((0, 0, 0), (0, 0, 1), 1.0, radius=0.3),
+}
+
+
+@pytest.mark.parametrize("name", FLAT_SOLIDS)
+def test_grazing_rays_end_on_other_solids_too(name: str) -> None:
+    solid, rng = FLAT_SOLIDS[name], np.random.default_rng(7)
+    lower, upper = (corner.astype(np.float64) for corner in solid.bounds)
+    size = float(np.linalg.norm(upper - lower))
+    origins = 0.5 * (lower + upper) + 1.5 * size * random_units(rng, 3000)
+    targets = lower + rng.uniform(-0.1, 1.1, (3000, 3)) * (upper - lower)
+    distances = solid.raycast(origins, targets - origins).distances
+    hit = np.isfinite(distances)
+    points = (origins + distances[:, None] * unit(targets - origins))[hit]
+    slopes = np.linalg.norm(solid.gradient(points), axis=1)
+    gaps = np.abs(solid(points) - 0.5) / slopes
+    assert (gaps < 1e-6 * size).mean() > 0.995  # without a step along the ray 0.79 to 0.96
 
 
 def test_a_ray_that_starts_inside_hits_at_once() -> None:
