@@ -33,7 +33,7 @@ from decals.scenes.scene import DecalImage, Scene
 from decals.validation import member
 
 NOTHING = object()
-"""Mark that no changes were discarded."""
+"""Mark that no state was discarded, or written."""
 
 
 class FileActions(WindowActions):
@@ -78,6 +78,7 @@ class FileActions(WindowActions):
         self.recovery = self._recovery_beside(path)
         self._exists = path is not None and exists(path)
         self._begun: Path | None = None
+        self._written: object = NOTHING
         self._aside: tuple[str | PathLike[str] | None, RecoveryFile, bool] | None = None
         self._closing = False
         self._discarded: object = NOTHING
@@ -130,6 +131,7 @@ class FileActions(WindowActions):
 
         self._begun = Path(path)
         self._state.background.save(path, self.camera(), saved)
+        self._written = self._state.session.position
 
     # -- other files ------------------------------------------------------------------------------------
 
@@ -330,15 +332,17 @@ class FileActions(WindowActions):
         state = self._state
         if self._discarded is state.session.position:
             return True
-        if state.background.saving:
+        saving = state.background.saving
+        if saving and self._written is state.session.position:
             self._closing = True
             state.show("saving; the window closes afterwards")
             return False
-        if not state.session.modified and not state.background.busy_editing:
+        if not (saving or state.session.modified or state.background.busy_editing):
             return True
         if state.prompt.asking:
             self._discard_changes()
             return True
+        self._closing = False
         state.prompt.begin(
             Question(
                 "unsaved changes.   Q: close without saving   S: save and close   Escape: go on",

@@ -123,6 +123,33 @@ def test_closing_waits_for_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert not actions.state.background.busy
 
 
+def test_closing_asks_about_changes_that_the_running_save_leaves_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Undo, too, is such a change: it leads back to what the old file has, and the save replaces that."""
+    path = tmp_path / "scene.json"
+    actions = threaded(path=path)
+    state, left = actions.state, []
+    actions.files.leave = lambda: left.append(True)
+    state.session.do(ScaleDecals([1], 2.0))
+    begun, go = hold_writing(monkeypatch)
+    press(actions, "save")
+    assert begun.wait(LONG)
+    press(actions, "close")
+    assert "closes afterwards" in state.message
+    assert not state.prompt.asking
+    state.session.undo()
+    press(actions, "close")
+    assert state.prompt.asking
+    go.set()
+    finish(actions)
+    actions.files.update()
+    assert state.session.modified
+    assert left == []
+    state.prompt.key("q", "q")
+    assert left == [True]
+
+
 def test_closing_says_what_could_not_be_saved(tmp_path: Path) -> None:
     actions = threaded(path=tmp_path / "nowhere" / "scene.json")
     press(actions, "save")
