@@ -1,15 +1,24 @@
 """Gaps between the leaves of a tree, and growth that leaves them open."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.cells.surface_box import surface_box
-from blobtree.formulas.falloff import RIM
+from blobtree.formulas.falloff import ISO, RIM
 from blobtree.tape.bounds import leaf_boxes
 from blobtree.tape.grown import leaf_tape
-from blobtree.tape.model import ImplicitModel, gradients_at
+from blobtree.tape.model import ImplicitModel, gradients_at, values_at
 from blobtree.tape.part_sizes import has_warps
-from blobtree.tape.program import PlacedPrimitive, ProgramPrimitive, Run, influence_radii
+from blobtree.tape.program import (
+    PlacedPrimitive,
+    ProgramField,
+    ProgramPrimitive,
+    Run,
+    Slab,
+    influence_radii,
+)
 from blobtree.tape.tape import Tape
 
 GAP_SHARE = 1 / 3
@@ -24,25 +33,51 @@ GAP_STEPS = 12
 SURFACE_STEPS = 4
 """Steps of Newton's method to the surface of a leaf alone; the first one is exact in similarity maps."""
 
+FACE_POINTS = 24
+"""Points along each side of a box around a face."""
+
+TOUCHING = 1e-4
+"""Gap over the reach of a search below which a leaf touches a face."""
+
 GAP_STARTS = (0.0, 0.5, 1.0)
 """Places between a skeleton's middle and the corners of its hull at which these steps start."""
 
 
 def hull_corners(placed: PlacedPrimitive) -> Float64Array:
-    """Return the corners (n, 3) of the hull of a leaf's skeleton, in the space around its map."""
-    leaf = placed.primitive
-    assert isinstance(leaf, ProgramPrimitive)
-    matrix = placed.placement.matrix
-    corners: Float64Array = type(leaf).hulls([leaf])[0] @ matrix[:3, :3].T + matrix[:3, 3]
+    """Return the corners (n, 3) of the hull of a leaf or its skeleton, in the space around its map."""
+    leaf, matrix = placed.primitive, placed.placement.matrix
+    if isinstance(leaf, ProgramPrimitive):
+        hull = type(leaf).hulls([leaf])[0]
+    else:
+        assert isinstance(leaf, ProgramField)
+        hull = type(leaf).hulls([leaf])[0]
+    corners: Float64Array = hull @ matrix[:3, :3].T + matrix[:3, 3]
     return corners
 
 
+def thinnest_slab(placed: PlacedPrimitive) -> tuple[int, Slab] | None:
+    """Return the number of a leaf's pair of flat faces that are nearest each other, and the pair itself.
+
+    It is in the space around the leaf's map. The result is None for leaves that cannot be made thicker there.
+    """
+    leaf = placed.primitive
+    if not isinstance(leaf, ProgramField) or leaf.profile[2] != 1.0:
+        return None
+    slabs = [slab.placed(placed.placement) for slab in leaf.slabs]
+    number, thinnest = min(enumerate(slabs), key=lambda one: one[1].core, default=(0, None))
+    return None if thinnest is None or thinnest.core <= 0.0 else (number, thinnest)
+
+
 def limit_by_gaps(
-    tree: ImplicitModel, leaves: list[tuple[Run, PlacedPrimitive]], lengths: Float64Array
+    tree: ImplicitModel,
+    leaves: list[tuple[Run, PlacedPrimitive]],
+    lengths: Float64Array,
+    slabs: Mapping[int, Slab],
 ) -> None:
     """Lower growths at gaps between leaves, so that these stay open; below warps, gaps are not known.
 
-    Nothing grows where too many leaves are near each other.
+    Nothing grows where too many leaves are near each other. `slabs` has the leaves that grow across a slab,
+    by number; all others grow on all sides.
     """
     if not lengths.any():
         return
@@ -57,7 +92,15 @@ def limit_by_gaps(
         return
     for number, near in beside.items():
         placed, reach = leaves[number][1], lengths[number] / GAP_SHARE
-        if reach == 0.0 or not isinstance(placed.primitive, ProgramPrimitive):
+        if reach == 0.0:
+            continue
+        if number in slabs:
+            faces = face_points(tree, placed, number, slabs[number])
+            others = [(leaves[other][1], other) for other in near[near != number].tolist()]
+            gaps = [_gap_over(tree, slabs[number], faces, *other, reach) for other in others]
+            lengths[number] = min([lengths[number], *(GAP_SHARE * gap for gap in gaps)])
+            continue
+        if not isinstance(placed.primitive, ProgramPrimitive):
             continue
         one = _Skeleton(tree, placed, number, reach)
         starts = one.closest(_starts(placed))
@@ -111,8 +154,13 @@ def _starts(placed: PlacedPrimitive) -> Float64Array:
 
 
 def surface_points(tree: ImplicitModel, placed: PlacedPrimitive, number: int) -> Float64Array:
-    """Return points (n, 3) all over the surface of a leaf alone."""
-    if not isinstance(placed.primitive, ProgramPrimitive) or has_warps(tree):
+    """Return points (n, 3) all over the surface of a leaf alone, or on both faces of its thinnest slab."""
+    if has_warps(tree):
+        return np.empty((0, 3))
+    flat = thinnest_slab(placed)
+    if flat is not None:
+        return face_points(tree, placed, number, flat[1]).reshape(-1, 3)
+    if not isinstance(placed.primitive, ProgramPrimitive):
         return np.empty((0, 3))
     skeleton = _Skeleton(tree, placed, number, 0.0)
     beside = 1.5 * skeleton.radius * np.concatenate([np.eye(3), -np.eye(3)])
@@ -122,6 +170,49 @@ def surface_points(tree: ImplicitModel, placed: PlacedPrimitive, number: int) ->
         points = _at_distance(tape, points, RIM)
         points = points[np.isfinite(points).all(axis=1)]
     return points
+
+
+def face_points(tree: ImplicitModel, placed: PlacedPrimitive, number: int, slab: Slab) -> Float64Array:
+    """Return points (2, n, 3) on the lower and the upper face of a leaf's slab."""
+    corners = hull_corners(placed) - slab.middle
+    flat = corners - np.outer(corners @ slab.normal, slab.normal)
+    axes = np.linalg.svd(flat - flat.mean(axis=0))[2][:2]
+    ends = flat @ axes.T
+    lower, upper = ends.min(axis=0), ends.max(axis=0)
+    shares = (np.arange(FACE_POINTS) + 0.5) / FACE_POINTS
+    places = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2)
+    inner = slab.middle + (lower + places * (upper - lower)) @ axes
+    inside = values_at(leaf_tape(tree._program, number), inner) > ISO
+    ways = slab.half * slab.normal
+    return np.stack([inner[inside] - ways, inner[inside] + ways])
+
+
+def _gap_over(
+    tree: ImplicitModel,
+    slab: Slab,
+    faces: Float64Array,
+    other: PlacedPrimitive,
+    number: int,
+    reach: float,
+) -> float:
+    """Return the distance of another leaf from a slab, across it; infinity if they meet or are far apart.
+
+    What hangs over a face that it meets elsewhere leaves no gap.
+    """
+    heights = (hull_corners(other) - slab.middle) @ slab.normal
+    beyond = slab.half
+    if isinstance(other.primitive, ProgramPrimitive):
+        stretch = float(np.linalg.svd(other.placement.matrix[:3, :3], compute_uv=False)[0])
+        beyond += RIM * float(influence_radii([other]).max()) * stretch
+    gap = float(max(heights.min(), -heights.max())) - beyond
+    if gap > TOUCHING * reach:
+        return gap
+    distances = np.linspace(0.0, reach, GAP_STEPS)
+    ways = np.stack([-slab.normal, slab.normal])[:, None] * distances[:, None, None, None]
+    tape = leaf_tape(tree._program, number)
+    inside = values_at(tape, (faces + ways).reshape(-1, 3)).reshape(len(distances), -1) >= ISO
+    over = np.asarray(inside.any(axis=1))
+    return float(distances[over.argmax()]) if over.any() and not over[0] else float(np.inf)
 
 
 def _gap(one: "_Skeleton", other: "_Skeleton", starts: Float64Array) -> float:

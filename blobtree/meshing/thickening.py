@@ -6,6 +6,8 @@ has the shape of the surface, in few triangles. Then its vertices go back to the
 
 * A vertex of a plate moves toward its foot, the closest point of the plate's skeleton. The plate's surface
   lies between both, however thin it is.
+* A plate without a skeleton grows across its two faces alone. A vertex goes back by the same map, which takes
+  edges to edges.
 * A vertex of a wall moves toward the middle of the wall, at a distance from its leaf's skeleton.
 * Where both fail, or lead farther, Newton's method finds the surface.
 
@@ -14,7 +16,7 @@ vertices look for the other sides of plates, walls and gaps: each side must have
 fails is meshed again with less growth, and at last with cells as small as its parts are thin (`parts`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
@@ -32,7 +34,7 @@ from blobtree.formulas.falloff import ISO, RIM
 from blobtree.kernels import load_together
 from blobtree.lazy import Lazy
 from blobtree.meshing.block_tree import on_device
-from blobtree.meshing.leaf_gaps import hull_corners, limit_by_gaps, surface_points
+from blobtree.meshing.leaf_gaps import hull_corners, limit_by_gaps, surface_points, thinnest_slab
 from blobtree.meshing.mesh import Mesh, vertex_arrays
 from blobtree.meshing.parts import FirstCells, ThinPart, first_cells, mesh_of_parts, warn_of_thin_parts
 from blobtree.meshing.thickening_kernels import (
@@ -45,10 +47,10 @@ from blobtree.meshing.thickening_kernels import (
 from blobtree.meshing.walls import WALL_CELLS
 from blobtree.progress import Progress
 from blobtree.tape.bounds import leaf_boxes
-from blobtree.tape.grown import GrownModel, leaf_tape, runs_of_leaves
+from blobtree.tape.grown import NO_SLAB, GrownModel, leaf_tape, runs_of_leaves
 from blobtree.tape.model import ImplicitModel, gradients_at, values_at
-from blobtree.tape.part_sizes import has_warps, part_sizes
-from blobtree.tape.program import PlacedPrimitive, ProgramPrimitive, Run, influence_radii
+from blobtree.tape.part_sizes import bounded_by_slabs, has_warps, part_sizes
+from blobtree.tape.program import PlacedPrimitive, ProgramPrimitive, Run, Slab, influence_radii
 
 MAX_ATTEMPTS = 6
 """Most meshes of grown trees."""
@@ -59,8 +61,8 @@ MAX_GROWN_TRIANGLES = 500_000
 LESS = 0.25
 """Largest growth of a part after it failed, over that before."""
 
-GROWS = 3.0
-"""Least growth of a part over the size of cells that it needs: less saves few cells."""
+PLATE_GROWS, GROWS = 1.5, 3.0
+"""Least growth of a plate, and of a wall, over the size of cells that it needs: less saves few cells."""
 
 THIN = 0.5
 """Size of cells that a part needs, over those of the base, below which it grows."""
@@ -92,6 +94,12 @@ MAX_FIELD_ERROR = 0.05
 
 MAX_WAY = 2.5
 """Longest way back of a vertex, over the growth; longer ones lead to other parts."""
+
+MOST_CORRECTION = 1e-3
+"""Largest distance of a vertex from where the map of a slab takes it, over the growth, to be on its edges."""
+
+SLIDES = 8
+"""Steps of Newton's method along the faces of a slab."""
 
 MENDINGS = 3
 """Rounds in which faulty vertices start from their neighbours."""
@@ -151,17 +159,24 @@ class _Growth:
     """The same in the world's (n,)."""
     aims: Float64Array
     """Distances from skeletons, over influences after the growth, that lie in plates and walls (n,)."""
+    slabs: dict[int, tuple[int, Slab]]
+    """Of the leaves that grow across a slab, by number: its number and its place."""
 
     @staticmethod
     def none(tree: ImplicitModel) -> "_Growth":
         """Return no growth."""
         zeros = np.zeros(sum(1 for _ in runs_of_leaves(tree._program)))
-        return _Growth(tree, zeros, zeros, zeros)
+        return _Growth(tree, zeros, zeros, zeros, {})
 
     @Lazy
     def grown(self) -> ImplicitModel:
         """Return the tree after."""
-        return GrownModel(self.tree, self.amounts) if self.amounts.any() else self.tree
+        if not self.amounts.any():
+            return self.tree
+        slabs = np.full(len(self.amounts), NO_SLAB)
+        for number, (slab, _) in self.slabs.items():
+            slabs[number] = slab
+        return GrownModel(self.tree, self.amounts, slabs)
 
     @property
     def reach(self) -> float:
@@ -170,10 +185,13 @@ class _Growth:
 
     def then(self, later: "_Growth") -> "_Growth":
         """Return this growth and one of its grown tree, whose leaves are others."""
-        both = zip(
-            (self.amounts, self.lengths, self.aims), (later.amounts, later.lengths, later.aims), strict=True
+        return _Growth(
+            self.tree,
+            self.amounts + later.amounts,
+            self.lengths + later.lengths,
+            self.aims + later.aims,
+            self.slabs | later.slabs,
         )
-        return _Growth(self.tree, *(a + b for a, b in both))
 
 
 class _Vertices:
@@ -188,6 +206,8 @@ class _Vertices:
         self.moved = self.faulty.copy()
         self.owners = np.full(len(mesh.vertices), -1, np.int32)
         """The leaf to whose surface each vertex belonged; −1 for others than those that grew."""
+        self.flattened = self.faulty.copy()
+        """Vertices that the map of a slab has brought to the surface."""
 
     def go_back(self, growth: _Growth) -> None:
         """Move the vertices to the surface of the tree before it grew; all others keep what they have."""
@@ -197,10 +217,42 @@ class _Vertices:
         listed = np.flatnonzero(off | on_grown)
         self.owners = owners
         self.moved[listed] = True
-        self._place(growth.tree, self.starts[listed], listed, growth.reach, owners[listed], feet[listed])
+        on_slabs = np.isin(owners, list(growth.slabs))
+        points = np.where(on_slabs[:, None], feet, self.starts)[listed]
+        others = np.where(on_slabs, -1, owners)[listed]
+        self._place(growth.tree, points, listed, growth.reach, others, feet[listed])
+        for number in growth.slabs:
+            self._slide(growth, number)
+        ways = np.linalg.norm(self.mesh.vertices - feet, axis=1)
+        self.flattened = on_slabs & ~self.faulty & (ways <= MOST_CORRECTION * growth.reach)
         ways = np.linalg.norm(self.mesh.vertices - before.vertices, axis=1)
         self.faulty |= ways > MAX_WAY * growth.reach
         self._mend(growth)
+
+    def _slide(self, growth: _Growth, number: int) -> None:
+        """Move vertices of a slab along its faces to where other leaves cut it, by Newton's method.
+
+        Across the faces, a step as long as the slab is thin would leave it.
+        """
+        mesh, normal, tape = self.mesh, growth.slabs[number][1].normal, growth.tree.tape
+        own = np.flatnonzero(self.owners == number)
+        rows = gradients_at(tape, mesh.vertices[own]).astype(np.float64)
+        off = np.abs(rows[:, 0] - ISO) > ON_SURFACE
+        listed, first = own[off], rows[off]
+        rows, points = first, mesh.vertices[listed].astype(np.float64)
+        for _step in range(SLIDES):
+            along = rows[:, 1:] - np.outer(rows[:, 1:] @ normal, normal)
+            squared = np.maximum((along**2).sum(axis=1), 1e-300)
+            steps = ((ISO - rows[:, 0]) / squared)[:, None] * along
+            lengths = np.linalg.norm(steps, axis=1, keepdims=True)
+            points += steps * np.minimum(1.0, growth.reach / np.maximum(lengths, 1e-300))
+            rows = gradients_at(tape, points).astype(np.float64)
+        better = np.abs(rows[:, 0] - ISO) < np.abs(first[:, 0] - ISO)
+        listed, rows = listed[better], rows[better]
+        vertices, normals = mesh.vertices.copy(), mesh.normals.copy()
+        vertices[listed], normals[listed] = points[better], _outward(rows)
+        self.mesh = replace(mesh, vertices=vertices, normals=normals)
+        self.faulty[listed] = np.abs(rows[:, 0] - ISO) > MAX_FIELD_ERROR
 
     def _mend(self, growth: _Growth) -> None:
         """Place faulty vertices again, from the middle of their neighbours that are not."""
@@ -261,22 +313,28 @@ class _Vertices:
             inputs = [points, listed, number, aim, reach, own.data, own.span]
             kernel = tape.instruction_set.kernel_for(find_feet)
             launch(kernel, len(listed), inputs, [nearness, owners, feet], device)
-            if aim == 0.0:
+            if aim == 0.0 and number not in growth.slabs:
                 tape = leaf_tape(growth.tree._program, number, FOOT_GROWTH * growth.amounts[number])
                 own = tape.on(device)
                 inputs = [listed, number, reach, own.data, own.span, owners]
                 kernel = tape.instruction_set.kernel_for(improve_feet)
                 launch(kernel, len(listed), inputs, [feet], device)
-        return owners.numpy(), nearness.numpy(), feet.numpy()
+        found, places = owners.numpy(), feet.numpy()
+        for number, (_, slab) in growth.slabs.items():
+            own = found == number
+            places[own] = slab.flattened(self.starts[own], float(growth.lengths[number]))
+        return found, nearness.numpy(), places
 
     def finished(self) -> Mesh:
-        """Return the mesh; creases that moved count as parts whose sheets do not meet nearby."""
+        """Return the mesh; creases that moved otherwise than by the map of a slab are left open.
+
+        They count as parts whose sheets do not meet nearby.
+        """
         counts = self.mesh.sheet_counts
         if counts is None:
             return self.mesh
-        return replace(
-            self.mesh, sheet_counts=np.where(self.moved & (counts > 1), 0, counts).astype(np.uint8)
-        )
+        opened = self.moved & ~self.flattened & (counts > 1)
+        return replace(self.mesh, sheet_counts=np.where(opened, 0, counts).astype(np.uint8))
 
 
 def mesh_of_thin_parts(
@@ -305,7 +363,7 @@ def mesh_of_thin_parts(
     for attempt in range(MAX_ATTEMPTS):
         plates = _grown_plates(tree, size, limits)
         first = first_cells(plates.grown, partial(grid_of, plates.grown), device, report)
-        growth = plates.then(_grown_walls(plates.grown, first, size, limits))
+        growth = plates.then(_grown_walls(plates.grown, first, size, limits, plates.slabs))
         if growth.grown is tree:
             break
         walls_grow = not np.array_equal(growth.amounts, plates.amounts)
@@ -331,28 +389,33 @@ def mesh_of_thin_parts(
 def _grown_plates(tree: ImplicitModel, size: float, limits: Float64Array) -> _Growth:
     """Return the growth of plates that are too thin for cells of a size, up to limits."""
     needed = part_sizes(tree)[0] / BALL_CELLS
-    lengths, scales = np.zeros(len(needed)), np.ones(len(needed))
-    half = PLATE_CELLS * size * (WARP_MARGIN if has_warps(tree) else MARGIN)
-    leaves = list(runs_of_leaves(tree._program))
-    for number in np.flatnonzero(needed < THIN * size):
-        run, placed = leaves[number]
-        if not _may_be_plate(run, placed):
-            continue
+    lengths, scales, warped = np.zeros(len(needed)), np.ones(len(needed)), has_warps(tree)
+    margin = size * (WARP_MARGIN if warped else MARGIN)
+    leaves, slabs = list(runs_of_leaves(tree._program)), dict[int, tuple[int, Slab]]()
+    for number in np.flatnonzero(needed < THIN * size).tolist():
+        (run, placed), half = leaves[number], PLATE_CELLS * margin
         spectrum = np.linalg.svd(placed.placement.matrix[:3, :3], compute_uv=False)
-        width = _width(placed)
-        if width < 2.0 * PLATE_LENGTHS * needed[number] or spectrum[0] > MAX_STRETCH * spectrum[-1]:
+        flat, scales[number] = None if warped else thinnest_slab(placed), spectrum[-1]
+        if spectrum[0] > MAX_STRETCH * spectrum[-1] and not bounded_by_slabs(placed.primitive):
             continue
-        scales[number] = spectrum[-1]
-        lengths[number] = min(half, width / PLATE_LENGTHS, limits[number])
-    limit_by_gaps(tree, leaves, lengths)
-    lengths[lengths < GROWS * needed] = 0.0
-    return _Growth(tree, lengths / scales, lengths, np.zeros(len(lengths)))
+        if flat is not None:
+            slabs[number], half = flat, BALL_CELLS * margin
+            scales[number], needed[number] = flat[1].scale, flat[1].half / BALL_CELLS
+        elif not _may_be_plate(run, placed):
+            continue
+        width = _width(placed)
+        if width >= 2.0 * PLATE_LENGTHS * needed[number]:
+            lengths[number] = min(half, width / PLATE_LENGTHS, limits[number])
+    limit_by_gaps(tree, leaves, lengths, {number: slab for number, (_, slab) in slabs.items()})
+    lengths[lengths < PLATE_GROWS * needed] = 0.0
+    grown = {number: slab for number, slab in slabs.items() if lengths[number]}
+    return _Growth(tree, lengths / scales, lengths, np.zeros(len(lengths)), grown)
 
 
 def _may_be_plate(run: Run, placed: PlacedPrimitive) -> bool:
-    """Return True for flat skeletons and solids with the default profile."""
+    """Return True for flat skeletons and solids whose surface lies where their radii say."""
     leaf = placed.primitive
-    if not isinstance(leaf, ProgramPrimitive) or leaf.signed or leaf.profiled:
+    if not isinstance(leaf, ProgramPrimitive) or leaf.profile[2] != 1.0:
         return False
     assert isinstance(run.kind, Skeleton)
     return run.kind.cells == PLATE_CELLS or float(type(leaf).inradii([leaf])[0]) > 0.0
@@ -365,10 +428,13 @@ def _width(placed: PlacedPrimitive) -> float:
     return float(np.sort(np.ptp(corners @ axes.T, axis=0))[1])
 
 
-def _grown_walls(tree: ImplicitModel, first: FirstCells, size: float, limits: Float64Array) -> _Growth:
+def _grown_walls(
+    tree: ImplicitModel, first: FirstCells, size: float, limits: Float64Array, slabs: Container[int]
+) -> _Growth:
     """Return the growth of bodies whose tools leave thin walls, and of tools between which there are some.
 
-    What two bodies have in common is a lens: it would grow far beyond its rim.
+    What two bodies have in common is a lens: it would grow far beyond its rim. Leaves that have grown across
+    slabs do not grow again.
     """
     leaves, halves = list(runs_of_leaves(tree._program)), part_sizes(tree)[0]
     lengths, scales, depths = np.zeros(len(leaves)), np.ones(len(leaves)), np.zeros(len(leaves))
@@ -387,12 +453,12 @@ def _grown_walls(tree: ImplicitModel, first: FirstCells, size: float, limits: Fl
             depth = 0.5 * wall.thickness
             if wall.operand.tool:
                 growth, depth = -0.5 * growth, -depth
-            if placed.primitive.signed or -growth > MAX_SHRINKAGE * radius:
+            if number in slabs or placed.primitive.signed or -growth > MAX_SHRINKAGE * radius:
                 return _Growth.none(tree)
             if abs(growth) > abs(lengths[number]):
                 lengths[number], scales[number], depths[number] = growth, scale, depth
     signs, lengths = np.sign(lengths), np.abs(lengths)
-    limit_by_gaps(tree, leaves, lengths)
+    limit_by_gaps(tree, leaves, lengths, {})
     lengths[lengths < GROWS * np.abs(depths)] = 0.0
     amounts = signs * lengths / scales
     aims = [
@@ -400,7 +466,7 @@ def _grown_walls(tree: ImplicitModel, first: FirstCells, size: float, limits: Fl
         for leaf, amount, depth in zip(leaves, amounts.tolist(), (depths / scales).tolist(), strict=True)
     ]
     try:
-        growth_of_all = _Growth(tree, amounts, signs * lengths, np.array(aims))
+        growth_of_all = _Growth(tree, amounts, signs * lengths, np.array(aims), {})
         _ = growth_of_all.grown.tape
     except InvalidNode:  # nothing is left of a tool
         return _Growth.none(tree)
@@ -414,7 +480,7 @@ def _aim(run: Run, placed: PlacedPrimitive, growth: float, depth: float) -> floa
     """
     if growth == 0.0:
         return 0.0
-    if not isinstance(run.kind, Skeleton) or placed.primitive.profiled:
+    if not isinstance(run.kind, Skeleton) or placed.primitive.profile[2] != 1.0:
         return -1.0
     influence = float(influence_radii([placed]).min())
     return max(RIM * influence - depth, 0.0) / (influence + growth / RIM)
@@ -429,6 +495,8 @@ def _radius_of_curvature(run: Run, placed: PlacedPrimitive) -> float:
 
 def _wrong_leaves(tree: ImplicitModel, vertices: _Vertices, size: float, growth: _Growth) -> IndexArray:
     """Return the leaves that grew too much: vertices are not on the surface, or parts of it have none."""
+    if not len(vertices.mesh.faces):
+        return np.flatnonzero(growth.amounts)
     sides = _Sides(vertices.mesh, SIDE_CELLS * size)
     missing, count = vertices.faulty.copy(), len(growth.amounts)
     for sign in (-1.0, 1.0):

@@ -10,7 +10,7 @@ most 1 / least influence per unit.
 
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, MISSING, Field, dataclass, field
+from dataclasses import KW_ONLY, MISSING, Field, dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, dataclass_transform
 
@@ -154,6 +154,11 @@ class Falling(LeafKeywords):
 @dataclass(frozen=True, eq=False, repr=False)
 class Profile(Falling):
     """The keywords of leaves that show a radius, whatever falloff and width they have."""
+
+    @property
+    def plain(self) -> Self:
+        """The leaf with the default falloff and width, which has the same surface."""
+        return replace(self, falloff=WYVILL, width=None)
 
     _: KW_ONLY
     width: Annotated[

@@ -1,8 +1,8 @@
 """Profiles: solids whose section is an outline, drawn along a line or turned around an axis."""
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY
-from typing import Any
+from dataclasses import KW_ONLY, replace
+from typing import Any, Self
 
 import numpy as np
 import warp as wp
@@ -31,6 +31,7 @@ from blobtree.nodes.sections import (
 )
 from blobtree.nodes.sharp import SHEET_TOLERANCE, relative_bounds, relative_distance
 from blobtree.nodes.sweeps import upright_sweep
+from blobtree.tape.program import Slab
 from blobtree.texels import Texels
 from blobtree.validation import Vector
 
@@ -222,6 +223,23 @@ class _Extrusion(SectionSolid):
     height: float = par.length("length along the normal of the plane")
 
     @property
+    def slabs(self) -> tuple[Slab, ...]:
+        """Base and top."""
+        normal = np.cross(self.u, self.v)
+        middle = self.origin + 0.5 * self.height * normal
+        return (Slab(middle, normal, 0.5 * self.height, self.offset),)
+
+    def thickened(self, slab: int, growth: float) -> Self:
+        """Return a higher solid, whose field reaches farther in."""
+        origin = tuple((self.origin - growth * self.slabs[slab].normal).tolist())
+        return replace(self, origin=origin, height=self.height + 2.0 * growth, mean=self.mean + growth)
+
+    @property
+    def inner_radius(self) -> float:
+        """Half the height, or the mean radius of the outline where that is less."""
+        return min(0.5 * self.height, mean_radius(self.outline))
+
+    @property
     def data(self) -> Float64Array:
         """The outline."""
         return outline_texels(self.outline)
@@ -258,6 +276,12 @@ class _Revolution(SectionSolid):
     outline: Section
     origin: Vector = par.point("where the outline's origin lies")
     angle: float = par.angle("angle of the turn", low=0.0, high=WHOLE_TURN)
+
+    @property
+    def inner_radius(self) -> float:
+        """The mean radius of the outline, or the length of a turn where that is less."""
+        turn = np.radians(self.angle) * mean_distance(self.outline) if self.angle < WHOLE_TURN else np.inf
+        return float(min(mean_radius(self.outline), turn))
 
     @property
     def data(self) -> Float64Array:
@@ -331,18 +355,17 @@ class Prism(Pieces):
     def expanded(self) -> Node:
         """Return the direct field of the solid."""
         (u, v), corners = _polygon_frame(np.array(self.points))
-        base = Outline.polygon(corners)
-        mean = self.radius or min(0.5 * self.height, mean_radius(base))
-        return _Extrusion(
-            base,
-            self.points[0],
-            tuple(u.tolist()),
-            tuple(v.tolist()),
-            self.height,
-            offset=self.radius,
-            mean=mean,
-            **self.shared,
-        )
+        axes = tuple(u.tolist()), tuple(v.tolist())
+        return _extrusion(Outline.polygon(corners), self.points[0], axes, self)
+
+
+def _extrusion(
+    outline: Outline, origin: Vector, axes: tuple[Vector, Vector], leaf: "Prism | Extrude"
+) -> _Extrusion:
+    """Return the direct field of an outline that rises to the height of a leaf, in a plane with axes."""
+    keywords = {"offset": leaf.radius, **leaf.shared}
+    solid = _Extrusion(outline, origin, *axes, leaf.height, mean=1.0, **keywords)
+    return replace(solid, mean=leaf.radius or solid.inner_radius)
 
 
 class Extrude(Pieces):
@@ -383,21 +406,12 @@ class Extrude(Pieces):
     @Lazy
     def expanded(self) -> Node:
         """Return the direct field of the solid."""
-        mean = self.radius or min(0.5 * self.height, mean_radius(self.outline))
-        if self.top_scale != 1.0 or self.top_turn != 0.0:
-            changes = {"end_scale": self.top_scale, "end_turn": self.top_turn}
-            keywords = {**changes, "offset": self.radius, "mean": mean, **self.shared}
-            return upright_sweep(self.outline, self.origin, self.height, **keywords)
-        return _Extrusion(
-            self.outline,
-            self.origin,
-            (1.0, 0.0, 0.0),
-            (0.0, 1.0, 0.0),
-            self.height,
-            offset=self.radius,
-            mean=mean,
-            **self.shared,
-        )
+        upright = _extrusion(self.outline, self.origin, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), self)
+        if self.top_scale == 1.0 and self.top_turn == 0.0:
+            return upright
+        changes = {"end_scale": self.top_scale, "end_turn": self.top_turn}
+        keywords = {**changes, "offset": self.radius, "mean": upright.mean, **self.shared}
+        return upright_sweep(self.outline, self.origin, self.height, **keywords)
 
 
 class Revolve(Pieces):
@@ -440,9 +454,6 @@ class Revolve(Pieces):
     @Lazy
     def expanded(self) -> Node:
         """Return the direct field of the solid."""
-        mean = self.radius or mean_radius(self.outline)
-        if self.angle < WHOLE_TURN and not self.radius:
-            mean = min(mean, np.radians(self.angle) * mean_distance(self.outline))
-        return _Revolution(
-            self.outline, self.origin, self.angle, offset=self.radius, mean=mean, **self.shared
-        )
+        keywords = {"offset": self.radius, **self.shared}
+        solid = _Revolution(self.outline, self.origin, self.angle, mean=1.0, **keywords)
+        return replace(solid, mean=self.radius or solid.inner_radius)

@@ -282,6 +282,7 @@ def _heap(lower: Float64Array, upper: Float64Array) -> Float64Array:
     return boxes
 
 
+@lru_cache(maxsize=64)
 def mean_radius(outline: Outline) -> float:
     """Return twice the area of an outline over its length: the radius of a circle."""
     lengths = [

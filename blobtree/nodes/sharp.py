@@ -25,7 +25,7 @@ from blobtree.nodes.pieces import Pieces, shared_of
 from blobtree.nodes.primitives import CORNERS, SHARP_FORMS, Box, Columns, Cone, Profile, octagons
 from blobtree.nodes.solids import Cylinder
 from blobtree.nodes.volumes import box_distance
-from blobtree.tape.program import profile_extent
+from blobtree.tape.program import Slab, profile_extent
 from blobtree.validation import Vector
 
 wp.set_module_options({"enable_backward": False})
@@ -194,8 +194,13 @@ class SharpSolid(Profile, FieldPrimitive):
 
     @classmethod
     def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
-        """Return the sums of mean radius and offset, 0 or less where nothing is left."""
-        return np.array([leaf.mean + leaf.offset for leaf in leaves])
+        """Return the radii of the largest balls inside, 0 or less where nothing is left."""
+        return np.array([leaf.inner_radius + leaf.offset for leaf in leaves])
+
+    @property
+    def inner_radius(self) -> float:
+        """About the radius of the largest ball inside the solid without its offset."""
+        return self.mean
 
 
 class _SharpBox(SharpSolid):
@@ -205,6 +210,23 @@ class _SharpBox(SharpSolid):
 
     center: Vector = par.point("centre of the box")
     size: Vector = par.extents("lengths along x, y and z")
+
+    @property
+    def slabs(self) -> tuple[Slab, ...]:
+        """The faces across x, y and z."""
+        sides = zip(np.eye(3), self.size, strict=True)
+        return tuple(Slab(np.array(self.center), axis, 0.5 * side, self.offset) for axis, side in sides)
+
+    def thickened(self, slab: int, growth: float) -> Self:
+        """Return a larger box, whose field reaches farther in if its largest ball does."""
+        size = np.array(self.size) + 2.0 * growth * np.eye(3)[slab]
+        larger = replace(self, size=tuple(size.tolist()))
+        return replace(larger, mean=self.mean + larger.inner_radius - self.inner_radius)
+
+    @property
+    def inner_radius(self) -> float:
+        """Half the shortest side."""
+        return 0.5 * min(self.size)
 
     @classmethod
     def hulls(cls, leaves: Sequence[Any]) -> Float64Array:
@@ -276,6 +298,34 @@ class _SharpFrustum(SharpSolid):
     end: Vector = par.point("middle of the last end")
     start_radius: float = par.distance("radius of the first end", low=0.0)
     end_radius: float = par.distance("radius of the last end", low=0.0)
+
+    @property
+    def slabs(self) -> tuple[Slab, ...]:
+        """Both ends, unless the rim is sharper than 45 degrees: it is thin however far these are apart."""
+        ends = np.array([self.start, self.end])
+        (way,) = np.diff(ends, axis=0)
+        length = float(np.linalg.norm(way))
+        if abs(self.start_radius - self.end_radius) > length:
+            return ()
+        return (Slab(ends.mean(axis=0), way / length, 0.5 * length, self.offset),)
+
+    def thickened(self, slab: int, growth: float) -> Self:
+        """Return a longer cone, whose field reaches farther in."""
+        step = growth * self.slabs[slab].normal
+        start, end = np.array([self.start, self.end]) + np.array([-step, step])
+        ends = {"start": tuple(start.tolist()), "end": tuple(end.tolist())}
+        return replace(self, **ends, mean=self.mean + growth)
+
+    @property
+    def inner_radius(self) -> float:
+        """The largest of the smallest distances from side and ends of points on the axis."""
+        first, last = self.start_radius, self.end_radius
+        length = float(np.linalg.norm(np.subtract(self.end, self.start)))
+        slant = float(np.hypot(length, first - last))
+        widest, slope = first * length / slant, (last - first) / slant
+        rates = np.maximum([1.0 - slope, 1.0 + slope], LEAST_RATE)  # nearly 0 in a cone that is almost flat
+        middles = np.clip([0.5 * length, *np.array([widest, length - widest]) / rates], 0.0, length)
+        return float(np.minimum(np.minimum(middles, length - middles), widest + slope * middles).max())
 
     @classmethod
     def hulls(cls, leaves: Sequence[Any]) -> Float64Array:
@@ -457,21 +507,10 @@ def sharp_box(box: Any) -> Node:
 
 def sharp_frustum(solid: Any, first: float, last: float) -> Node:
     """Return the direct field of a cone with flat ends, which has the ends and the radius of a node."""
-    length = float(np.linalg.norm(np.subtract(solid.end, solid.start)))
-    slant = float(np.hypot(length, first - last))
-    widest, slope = first * length / slant, (last - first) / slant
-    rates = np.maximum([1.0 - slope, 1.0 + slope], LEAST_RATE)  # nearly 0 in a cone that is almost flat
-    middles = np.clip([0.5 * length, *np.array([widest, length - widest]) / rates], 0.0, length)
-    inradius = np.minimum(np.minimum(middles, length - middles), widest + slope * middles).max()
-    return _SharpFrustum(
-        solid.start,
-        solid.end,
-        first,
-        last,
-        offset=solid.radius,
-        mean=solid.radius or float(inradius),
-        **shared_of(solid),
+    frustum = _SharpFrustum(
+        solid.start, solid.end, first, last, offset=solid.radius, mean=1.0, **shared_of(solid)
     )
+    return replace(frustum, mean=solid.radius or frustum.inner_radius)
 
 
 def sharp_cylinder(cylinder: Cylinder) -> Node:

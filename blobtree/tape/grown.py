@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from blobtree._typing import Float64Array
+from blobtree._typing import Float64Array, IndexArray
 from blobtree.declare.registry import row_of
 from blobtree.lazy import Lazy
 from blobtree.tape.model import ImplicitModel
@@ -12,20 +12,24 @@ from blobtree.tape.program import (
     Instruction,
     LeaveWarp,
     PlacedPrimitive,
+    ProgramField,
     ProgramNode,
     Run,
 )
 from blobtree.tape.tape import Tape, compile_tape
 
+NO_SLAB = -1
+"""Number of a slab for a leaf that grows on all sides."""
+
 
 class GrownModel(ImplicitModel):
-    """A tree in which the visible radii of leaves are larger, each by a length of its own.
+    """A tree in which leaves are larger, each by a length of its own: on all sides, or across a slab.
 
-    The growths are in the leaves' own units, in the order of the program.
+    The growths are in the leaves' own units, in the order of the program, as are the numbers of slabs.
     """
 
-    def __init__(self, tree: ImplicitModel, growths: Float64Array) -> None:
-        self._tree, self._growths = tree, growths
+    def __init__(self, tree: ImplicitModel, growths: Float64Array, slabs: IndexArray) -> None:
+        self._tree, self._growths, self._slabs = tree, growths, slabs
 
     @property
     def children(self) -> tuple[ProgramNode, ...]:
@@ -39,19 +43,22 @@ class GrownModel(ImplicitModel):
 
     @Lazy
     def _program(self) -> list[Instruction]:
-        growths = iter(self._growths.tolist())
+        growths = zip(self._growths.tolist(), self._slabs.tolist(), strict=True)
         return [
-            replace(step, primitives=[grown(placed, next(growths)) for placed in step.primitives])
+            replace(step, primitives=[grown(placed, *next(growths)) for placed in step.primitives])
             if isinstance(step, Run)
             else step
             for step in self._tree._program
         ]
 
 
-def grown(placed: PlacedPrimitive, growth: float) -> PlacedPrimitive:
-    """Return a leaf whose visible radii are larger by a length in its own units."""
+def grown(placed: PlacedPrimitive, growth: float, slab: int = NO_SLAB) -> PlacedPrimitive:
+    """Return a leaf that is larger by a length in its own units, on all sides or across a slab."""
     if growth == 0.0:
         return placed
+    if slab != NO_SLAB:
+        assert isinstance(placed.primitive, ProgramField)
+        return PlacedPrimitive(placed.primitive.thickened(slab, growth), placed.placement)
     placement = replace(placed.placement, growth=placed.placement.growth + growth)
     return PlacedPrimitive(placed.primitive, placement)
 
@@ -62,7 +69,7 @@ def runs_of_leaves(program: list[Instruction]) -> Iterator[tuple[Run, PlacedPrim
 
 
 def leaf_tape(program: list[Instruction], number: int, growth: float = 0.0) -> Tape:
-    """Return the tape of one leaf alone, within the warps around it."""
+    """Return the tape of one leaf alone, with the default profile, within the warps around it."""
     warps: list[EnterWarp] = []
     first = 0
     for step in program:
@@ -74,6 +81,7 @@ def leaf_tape(program: list[Instruction], number: int, growth: float = 0.0) -> T
             case Run(primitives=primitives):
                 if first <= number < first + len(primitives):
                     leaf = grown(primitives[number - first], growth)
+                    leaf = leaf._replace(primitive=leaf.primitive.plain)
                     run = Run(step.kind, step.stretched, row_of("sum"), (), [leaf])
                     return compile_tape([*warps, run, *map(LeaveWarp, reversed(warps))])
                 first += len(primitives)

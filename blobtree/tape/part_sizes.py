@@ -15,7 +15,15 @@ from blobtree.formulas.falloff import RIM
 from blobtree.tape.bounds import leaf_boxes
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.operands import operands_of
-from blobtree.tape.program import EnterWarp, Run, distinct_placements, influence_radii
+from blobtree.tape.program import (
+    EnterWarp,
+    PlacedPrimitive,
+    ProgramField,
+    ProgramLeaf,
+    Run,
+    distinct_placements,
+    influence_radii,
+)
 from blobtree.tape.tape import Tape
 
 WARP_MARGIN = 8.0
@@ -56,10 +64,28 @@ def _breadths(run: Run) -> Float64Array:
     """
     leaves = [placed.primitive for placed in run.primitives]
     breadths = leaves[0].inradii(leaves)
-    if not isinstance(run.kind, Skeleton) or run.kind.cells == BALL_CELLS:
+    if not isinstance(run.kind, Skeleton):
+        for number, placed in enumerate(run.primitives):
+            if placed.placement.uniform_scale is None and bounded_by_slabs(placed.primitive):
+                breadths[number] = _stretched_breadth(placed)
+        return breadths
+    if run.kind.cells == BALL_CELLS:
         return breadths
     breadths += (BALL_CELLS / run.kind.cells - 1.0) * RIM * influence_radii(run.primitives).min(axis=1)
     return breadths
+
+
+def bounded_by_slabs(leaf: ProgramLeaf) -> bool:
+    """Return True for a block between three pairs of flat faces, at right angles in its own space."""
+    return isinstance(leaf, ProgramField) and len(leaf.slabs) == 3
+
+
+def _stretched_breadth(placed: PlacedPrimitive) -> float:
+    """Return half the least distance of a block's faces around its map, over the least scale of the map."""
+    leaf, placement = placed
+    assert isinstance(leaf, ProgramField)
+    least = np.linalg.svd(placement.matrix[:3, :3], compute_uv=False)[-1]
+    return float(min(slab.placed(placement).half for slab in leaf.slabs) / least)
 
 
 def has_small_parts(tree: ImplicitModel, size: float) -> bool:

@@ -13,13 +13,14 @@ The compiler knows no class of nodes: `ProgramNode` and `ProgramPrimitive` state
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from operator import attrgetter
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Box, Float64Array, IndexArray
+from blobtree._typing import Box, Float32Array, Float64Array, IndexArray
 from blobtree.declare.claims import OperatorRow, Support
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.field import FieldKind
@@ -155,6 +156,46 @@ def postorder(
     return order
 
 
+class Slab(NamedTuple):
+    """Two parallel faces between which a flat solid lies."""
+
+    middle: Float64Array
+    """A point halfway between both (3,)."""
+    normal: Float64Array
+    """Unit vector at right angles to both (3,)."""
+    core: float
+    """Half their distance without the offset of the solid."""
+    offset: float
+    """How far the offset moves each of them."""
+    scale: float = 1.0
+    """Factor of lengths across the faces, over those in the solid's own space."""
+
+    @property
+    def half(self) -> float:
+        """Half their distance."""
+        return self.core + self.offset
+
+    def placed(self, placement: Placement) -> "Slab":
+        """Return the faces in the space around a placement, whose growth is an offset too."""
+        linear = placement.matrix[:3, :3]
+        normal = np.asarray(np.linalg.solve(linear.T, self.normal), np.float64)
+        length = float(np.linalg.norm(normal))
+        middle = linear @ self.middle + placement.matrix[:3, 3]
+        offset = self.offset + placement.growth
+        core = self.core + min(offset, 0.0)  # what is left of a sharp solid has sharp edges too
+        return Slab(middle, normal / length, core / length, max(offset, 0.0) / length, 1.0 / length)
+
+    def flattened(self, points: Float32Array, growth: float) -> Float32Array:
+        """Return points (n, 3) from between faces that were farther out by a growth.
+
+        What is rounded by the offset moves as a whole.
+        """
+        heights = (points - self.middle) @ self.normal
+        core = self.core + growth
+        moves = np.where(np.abs(heights) > core, np.copysign(growth, heights), heights * (growth / core))
+        return (points - np.outer(moves, self.normal)).astype(np.float32)
+
+
 class ProgramLeaf(ProgramNode):
     """A leaf of a tree, as the compiler of programs reads it."""
 
@@ -168,6 +209,11 @@ class ProgramLeaf(ProgramNode):
     def profile(self) -> tuple[Falloff, float | None, float]:
         """Falloff, width (None in proportion to the radius) and weight."""
         raise NotImplementedError
+
+    @property
+    def plain(self) -> Self:
+        """The leaf with the default falloff and width, which has the same surface."""
+        return self
 
     @property
     def program_children(self) -> tuple[ProgramNode, ...]:
@@ -236,10 +282,25 @@ class ProgramField(ProgramLeaf):
         """
         raise NotImplementedError
 
+    @property
+    def slabs(self) -> tuple[Slab, ...]:
+        """Pairs of flat faces of the leaf that can be moved apart; empty for none."""
+        return ()
+
+    def thickened(self, slab: int, growth: float) -> Self:
+        """Return this leaf with both faces of a slab farther out by a growth."""
+        raise NotImplementedError
+
     @classmethod
     def boxes(cls, leaves: Sequence[Any]) -> Box:
         """Return lower and upper corners (n, 3) of boxes outside which the fields of n leaves are 0."""
         raise NotImplementedError
+
+    @classmethod
+    def hulls(cls, leaves: Sequence[Any]) -> Float64Array:
+        """Return points (n, k, 3) whose convex hulls hold n leaves; by default the corners of their boxes."""
+        lower, upper = cls.boxes(leaves)
+        return np.stack([np.where(end, upper, lower) for end in product((False, True), repeat=3)], axis=1)
 
     @classmethod
     def packed_fields(cls, leaves: Sequence[Any]) -> Float64Array:
