@@ -221,8 +221,12 @@ class _Vertices:
         points = np.where(on_slabs[:, None], feet, self.starts)[listed]
         others = np.where(on_slabs, -1, owners)[listed]
         self._place(growth.tree, points, listed, growth.reach, others, feet[listed])
-        for number in growth.slabs:
+        for number, (_, slab) in growth.slabs.items():
             self._slide(growth, number)
+            ways = np.linalg.norm(self.mesh.vertices - before.vertices, axis=1)
+            again = np.flatnonzero((owners == number) & (self.faulty | (ways > MAX_WAY * growth.reach)))
+            starts = self.starts[again]
+            self._place(growth.tree, starts, again, growth.reach, owners[again], slab.projected(starts))
         ways = np.linalg.norm(self.mesh.vertices - feet, axis=1)
         self.flattened = on_slabs & ~self.faulty & (ways <= MOST_CORRECTION * growth.reach)
         ways = np.linalg.norm(self.mesh.vertices - before.vertices, axis=1)

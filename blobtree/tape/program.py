@@ -185,6 +185,11 @@ class Slab(NamedTuple):
         core = self.core + min(offset, 0.0)  # what is left of a sharp solid has sharp edges too
         return Slab(middle, normal / length, core / length, max(offset, 0.0) / length, 1.0 / length)
 
+    def projected(self, points: Float32Array) -> Float32Array:
+        """Return the points (n, 3) halfway between the faces that are closest to points."""
+        heights = (points - self.middle) @ self.normal
+        return (points - np.outer(heights, self.normal)).astype(np.float32)
+
     def flattened(self, points: Float32Array, growth: float) -> Float32Array:
         """Return points (n, 3) from between faces that were farther out by a growth.
 

@@ -148,6 +148,13 @@ def test_plates_of_any_profile_have_their_areas(profile: dict[str, Any]) -> None
     assert checked_area(thin) == pytest.approx(plate_area(1e-3), rel=0.01)
 
 
+@pytest.mark.parametrize("name", ["block", "coin"])
+def test_a_ball_that_is_added_to_a_sharp_plate_blends_thinly(name: str) -> None:
+    """The plate's own field ends near its faces: Newton's method alone leaves it, toward the ball."""
+    tree = (sharp_plates(4e-3)[name] + Point((0.1, 0.3, 0), radius=0.25)).rotate((1, 2, 3), 40)
+    assert checked_area(tree) == pytest.approx(SHARP_AREAS[name] + 0.125 * np.pi, rel=0.04)
+
+
 def surface_of(tree: ImplicitModel, rng: np.random.Generator, count: int = 300) -> Float64Array:
     """Return points on the surface of a tree: where lines from outside into it enter the solid."""
     lower, upper = tree.support
