@@ -101,6 +101,9 @@ MOST_CORRECTION = 1e-3
 SLIDES = 8
 """Steps of Newton's method along the faces of a slab."""
 
+MOST_ACROSS = 0.9
+"""Part of a gradient across the faces, over its length, up to which a vertex slides: on a face it is 1."""
+
 MENDINGS = 3
 """Rounds in which faulty vertices start from their neighbours."""
 
@@ -241,7 +244,9 @@ class _Vertices:
         mesh, normal, tape = self.mesh, growth.slabs[number][1].normal, growth.tree.tape
         own = np.flatnonzero(self.owners == number)
         rows = gradients_at(tape, mesh.vertices[own]).astype(np.float64)
-        off = np.abs(rows[:, 0] - ISO) > ON_SURFACE
+        across = np.abs(rows[:, 1:] @ normal)
+        slides = across < MOST_ACROSS * np.linalg.norm(rows[:, 1:], axis=1)
+        off = slides & (np.abs(rows[:, 0] - ISO) > ON_SURFACE)
         listed, first = own[off], rows[off]
         rows, points = first, mesh.vertices[listed].astype(np.float64)
         for _step in range(SLIDES):

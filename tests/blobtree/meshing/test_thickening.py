@@ -149,6 +149,13 @@ def test_plates_of_any_profile_have_their_areas(profile: dict[str, Any]) -> None
 
 
 @pytest.mark.parametrize("name", ["block", "coin"])
+def test_sharp_plates_far_from_the_origin(name: str) -> None:
+    """Rounded numbers lift vertices off the faces; along these, Newton's method would lead anywhere."""
+    tree = sharp_plates(4e-3)[name].rotate((1, 2, 3), 20).translate((100, 50, 20))
+    assert checked_area(tree) == pytest.approx(SHARP_AREAS[name], rel=0.04)
+
+
+@pytest.mark.parametrize("name", ["block", "coin"])
 def test_a_ball_that_is_added_to_a_sharp_plate_blends_thinly(name: str) -> None:
     """The plate's own field ends near its faces: Newton's method alone leaves it, toward the ball."""
     tree = (sharp_plates(4e-3)[name] + Point((0.1, 0.3, 0), radius=0.25)).rotate((1, 2, 3), 40)
