@@ -96,7 +96,8 @@ MAX_WAY = 2.5
 """Longest way back of a vertex, over the growth; longer ones lead to other parts."""
 
 MOST_CORRECTION = 1e-3
-"""Largest distance of a vertex from where the map of a slab takes it, over the growth, to be on its edges."""
+"""Largest distance, over the growth, between a crease's vertex and where the map of a slab takes it: nearer
+ones stay a crease."""
 
 SLIDES = 8
 """Steps of Newton's method along the faces of a slab."""
