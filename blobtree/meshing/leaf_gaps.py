@@ -1,6 +1,8 @@
 """Gaps between the leaves of a tree, and growth that leaves them open."""
 
 from collections.abc import Mapping
+from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +38,10 @@ SURFACE_STEPS = 4
 FACE_POINTS = 24
 """Points along each side of a box around a face."""
 
+FACE_STEPS = np.geomspace(1e-3, 1.0, 24)
+"""Distances from a face at which another leaf is looked for, over the reach; the gap ends behind the last one
+without it."""
+
 TOUCHING = 1e-4
 """Gap over the reach of a search below which a leaf touches a face."""
 
@@ -44,13 +50,17 @@ GAP_STARTS = (0.0, 0.5, 1.0)
 
 
 def hull_corners(placed: PlacedPrimitive) -> Float64Array:
-    """Return the corners (n, 3) of the hull of a leaf or its skeleton, in the space around its map."""
+    """Return the corners (n, 3) of the hull of a leaf or its skeleton, in the space around its map.
+
+    A leaf that knows no hull has the corners of its box.
+    """
     leaf, matrix = placed.primitive, placed.placement.matrix
-    if isinstance(leaf, ProgramPrimitive):
-        hull = type(leaf).hulls([leaf])[0]
+    kind: Any = type(leaf)
+    if hasattr(kind, "hulls"):
+        hull = kind.hulls([leaf])[0]
     else:
-        assert isinstance(leaf, ProgramField)
-        hull = type(leaf).hulls([leaf])[0]
+        (lower,), (upper,) = kind.boxes([leaf])
+        hull = np.array(list(product(*zip(lower, upper, strict=True))))
     corners: Float64Array = hull @ matrix[:3, :3].T + matrix[:3, 3]
     return corners
 
@@ -195,7 +205,7 @@ def _gap_over(
     number: int,
     reach: float,
 ) -> float:
-    """Return the distance of another leaf from a slab, across it; infinity if they meet or are far apart.
+    """Return a bound on the distance of another leaf from a slab; infinity if they meet or are far apart.
 
     What hangs over a face that it meets elsewhere leaves no gap.
     """
@@ -207,12 +217,12 @@ def _gap_over(
     gap = float(max(heights.min(), -heights.max())) - beyond
     if gap > TOUCHING * reach:
         return gap
-    distances = np.linspace(0.0, reach, GAP_STEPS)
+    distances = np.concatenate([[0.0], reach * FACE_STEPS])
     ways = np.stack([-slab.normal, slab.normal])[:, None] * distances[:, None, None, None]
     tape = leaf_tape(tree._program, number)
     inside = values_at(tape, (faces + ways).reshape(-1, 3)).reshape(len(distances), -1) >= ISO
     over = np.asarray(inside.any(axis=1))
-    return float(distances[over.argmax()]) if over.any() and not over[0] else float(np.inf)
+    return float(distances[over.argmax() - 1]) if over.any() and not over[0] else float(np.inf)
 
 
 def _gap(one: "_Skeleton", other: "_Skeleton", starts: Float64Array) -> float:

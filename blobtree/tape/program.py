@@ -13,7 +13,6 @@ The compiler knows no class of nodes: `ProgramNode` and `ProgramPrimitive` state
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 from operator import attrgetter
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar, cast
 
@@ -300,12 +299,6 @@ class ProgramField(ProgramLeaf):
     def boxes(cls, leaves: Sequence[Any]) -> Box:
         """Return lower and upper corners (n, 3) of boxes outside which the fields of n leaves are 0."""
         raise NotImplementedError
-
-    @classmethod
-    def hulls(cls, leaves: Sequence[Any]) -> Float64Array:
-        """Return points (n, k, 3) whose convex hulls hold n leaves; by default the corners of their boxes."""
-        lower, upper = cls.boxes(leaves)
-        return np.stack([np.where(end, upper, lower) for end in product((False, True), repeat=3)], axis=1)
 
     @classmethod
     def packed_fields(cls, leaves: Sequence[Any]) -> Float64Array:

@@ -18,6 +18,7 @@ from blobtree import (
     Prism,
     Segment,
     Shell,
+    Superquadric,
     polygonize,
 )
 from blobtree._typing import Float64Array
@@ -289,6 +290,8 @@ def test_growth_across_a_slab_is_a_third_of_a_gap() -> None:
     assert gap_limit(plate, Box((0, 0, 0.5005), (1, 1, 1), radius=0.0)) == 1.0
     assert gap_limit(plate, Point((0, 0, 0.1), radius=0.5)) == 1.0
     assert gap_limit(plate, Point((2, 0, 0.1), radius=0.5)) == 1.0
+    over = Superquadric((0, 0, 0.3), (0.2, 0.2, 0.2))
+    assert 0.05 / 3 < gap_limit(plate, over) <= 0.1 / 3
 
 
 @pytest.mark.slow
