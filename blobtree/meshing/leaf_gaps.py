@@ -39,8 +39,8 @@ FACE_POINTS = 24
 """Points along each side of a box around a face."""
 
 FACE_STEPS = np.geomspace(1e-3, 1.0, 24)
-"""Distances from a face at which another leaf is looked for, over the reach; the gap ends behind the last one
-without it."""
+"""Distances from a face at which another leaf is looked for, over the reach. The gap is at least as wide as
+the last one before the leaf."""
 
 TOUCHING = 1e-4
 """Gap over the reach of a search below which a leaf touches a face."""
@@ -205,9 +205,9 @@ def _gap_over(
     number: int,
     reach: float,
 ) -> float:
-    """Return a bound on the distance of another leaf from a slab; infinity if they meet or are far apart.
+    """Return a lower bound on the distance of another leaf from a slab.
 
-    What hangs over a face that it meets elsewhere leaves no gap.
+    It is infinity if they are far apart, or meet: then the leaf may also hang over a face.
     """
     heights = (hull_corners(other) - slab.middle) @ slab.normal
     beyond = slab.half

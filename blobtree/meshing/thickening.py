@@ -96,14 +96,14 @@ MAX_WAY = 2.5
 """Longest way back of a vertex, over the growth; longer ones lead to other parts."""
 
 MOST_CORRECTION = 1e-3
-"""Largest distance, over the growth, between a crease's vertex and where the map of a slab takes it: nearer
-ones stay a crease."""
+"""Largest distance, over the growth, between a vertex and the place to which the map of a slab takes it, at
+which the vertex stays on a crease."""
 
 SLIDES = 8
 """Steps of Newton's method along the faces of a slab."""
 
 MOST_ACROSS = 0.9
-"""Part of a gradient across the faces, over its length, up to which a vertex slides: on a face it is 1."""
+"""Largest share of a gradient across the faces with which a vertex slides; on a face the share is 1."""
 
 MENDINGS = 3
 """Rounds in which faulty vertices start from their neighbours."""
@@ -211,11 +211,11 @@ class _Vertices:
         self.owners = np.full(len(mesh.vertices), -1, np.int32)
         """The leaf to whose surface each vertex belonged; −1 for others than those that grew."""
         self.flattened = self.faulty.copy()
-        """Vertices that the map of a slab has brought to the surface."""
+        """Vertices that the map of a slab alone has brought to the surface."""
 
     def go_back(self, growth: _Growth) -> None:
         """Move the vertices to the surface of the tree before it grew; all others keep what they have."""
-        before, owners, nearness, feet = self.mesh, *self._feet(growth)
+        owners, nearness, feet = self._feet(growth)
         off = np.abs(values_at(growth.tree.tape, self.starts) - ISO) > ON_SURFACE
         on_grown = nearness < ON_SURFACE
         listed = np.flatnonzero(off | on_grown)
@@ -226,28 +226,34 @@ class _Vertices:
         others = np.where(on_slabs, -1, owners)[listed]
         self._place(growth.tree, points, listed, growth.reach, others, feet[listed])
         for number, (_, slab) in growth.slabs.items():
-            self._slide(growth, number)
-            ways = np.linalg.norm(self.mesh.vertices - before.vertices, axis=1)
-            again = np.flatnonzero((owners == number) & (self.faulty | (ways > MAX_WAY * growth.reach)))
+            own = np.flatnonzero(owners == number)
+            self._slide(growth, number, own)
+            again = own[self.faulty[own] | self._ended_far(own, growth)]
             starts = self.starts[again]
             self._place(growth.tree, starts, again, growth.reach, owners[again], slab.projected(starts))
-        ways = np.linalg.norm(self.mesh.vertices - feet, axis=1)
-        self.flattened = on_slabs & ~self.faulty & (ways <= MOST_CORRECTION * growth.reach)
-        ways = np.linalg.norm(self.mesh.vertices - before.vertices, axis=1)
-        self.faulty |= ways > MAX_WAY * growth.reach
+        corrections = np.linalg.norm(self.mesh.vertices - feet, axis=1)
+        self.flattened = on_slabs & ~self.faulty & (corrections <= MOST_CORRECTION * growth.reach)
+        self.faulty |= self._ended_far(np.arange(len(self.starts)), growth)
         self._mend(growth)
 
-    def _slide(self, growth: _Growth, number: int) -> None:
+    def _ended_far(self, listed: IndexArray, growth: _Growth) -> BoolArray:
+        """Return True for vertices that have moved too far to be on the part from which they came."""
+        ways = self.mesh.vertices[listed] - self.starts[listed]
+        far: BoolArray = np.linalg.norm(ways, axis=1) > MAX_WAY * growth.reach
+        return far
+
+    def _slide(self, growth: _Growth, number: int, own: IndexArray) -> None:
         """Move vertices of a slab along its faces to where other leaves cut it, by Newton's method.
 
         Across the faces, a step as long as the slab is thin would leave it.
         """
         mesh, normal, tape = self.mesh, growth.slabs[number][1].normal, growth.tree.tape
-        own = np.flatnonzero(self.owners == number)
         rows = gradients_at(tape, mesh.vertices[own]).astype(np.float64)
         across = np.abs(rows[:, 1:] @ normal)
         slides = across < MOST_ACROSS * np.linalg.norm(rows[:, 1:], axis=1)
         off = slides & (np.abs(rows[:, 0] - ISO) > ON_SURFACE)
+        if not off.any():
+            return
         listed, first = own[off], rows[off]
         rows, points = first, mesh.vertices[listed].astype(np.float64)
         for _step in range(SLIDES):

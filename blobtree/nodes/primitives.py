@@ -155,11 +155,6 @@ class Falling(LeafKeywords):
 class Profile(Falling):
     """The keywords of leaves that show a radius, whatever falloff and width they have."""
 
-    @property
-    def plain(self) -> Self:
-        """The leaf with the default falloff and width, which has the same surface."""
-        return replace(self, falloff=WYVILL, width=None)
-
     _: KW_ONLY
     width: Annotated[
         float | None,
@@ -172,6 +167,11 @@ class Profile(Falling):
     def profile(self) -> tuple[Falloff, float | None, float]:
         """Falloff, width (None in proportion to the radius) and weight."""
         return cast(Falloff, self.falloff), self.width, self.weight
+
+    @property
+    def plain(self) -> Self:
+        """The leaf with the default falloff and width, which has the same surface."""
+        return replace(self, falloff=WYVILL, width=None)
 
 
 PROFILE = ("falloff", "width", "weight")

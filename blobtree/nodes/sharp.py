@@ -195,11 +195,12 @@ class SharpSolid(Profile, FieldPrimitive):
     @classmethod
     def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
         """Return the radii of the largest balls inside, 0 or less where nothing is left."""
-        return np.array([leaf.inner_radius + leaf.offset for leaf in leaves])
+        inner = [leaf.inner_radius if leaf.offset > 0.0 else leaf.mean for leaf in leaves]
+        return np.array(inner) + [leaf.offset for leaf in leaves]
 
     @property
     def inner_radius(self) -> float:
-        """About the radius of the largest ball inside the solid without its offset."""
+        """About the radius of the largest ball inside the solid without its offset: `mean` of sharp ones."""
         return self.mean
 
 
@@ -301,7 +302,7 @@ class _SharpFrustum(SharpSolid):
 
     @property
     def slabs(self) -> tuple[Slab, ...]:
-        """Both ends, unless the rim is sharper than 45 degrees: it is thin however far these are apart."""
+        """The two ends; none if the rim is sharper than 45 degrees, because such a rim stays thin."""
         ends = np.array([self.start, self.end])
         (way,) = np.diff(ends, axis=0)
         length = float(np.linalg.norm(way))
@@ -318,7 +319,7 @@ class _SharpFrustum(SharpSolid):
 
     @property
     def inner_radius(self) -> float:
-        """The largest of the smallest distances from side and ends of points on the axis."""
+        """The radius of the largest ball inside, whose centre is on the axis."""
         first, last = self.start_radius, self.end_radius
         length = float(np.linalg.norm(np.subtract(self.end, self.start)))
         slant = float(np.hypot(length, first - last))

@@ -33,7 +33,7 @@ from decals.scenes.scene import DecalImage, Scene
 from decals.validation import member
 
 NOTHING = object()
-"""Mark that no state was discarded, or written."""
+"""Stands for the state that was discarded or saved last, if there was none."""
 
 
 class FileActions(WindowActions):
