@@ -1,4 +1,4 @@
-from . import par
+from . import library, par
 from ._version import __version__
 from .conformance.laws import check_kind
 from .declare.falloff import Falloff
@@ -10,42 +10,14 @@ from .formulas.falloff import ISO, RIM
 from .formulas.falloffs import FALLOFF_NAMES
 from .identity import content_hash
 from .io import from_json, load, save, to_json
+from .library import *  # noqa: F403  all kinds of nodes
 from .meshing.batch import polygonize_batch
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
 from .meshing.polygonize import polygonize
 from .meshing.polygonizer import Polygonizer
-from .nodes.blends import (
-    BlendGraph,
-    CleanUnion,
-    ControllableBlend,
-    GradientBlend,
-    LocalBlend,
-    Masked,
-    Mirror,
-    RDifference,
-    RIntersection,
-    RUnion,
-    Shell,
-    SmoothDifference,
-    SmoothIntersection,
-    SuperellipticBlend,
-    SymmetricDifference,
-    Transition,
-    Unmasked,
-)
-from .nodes.contact import Bulge, ContactSurface, Press, RatedUnion, SolidContact
-from .nodes.convolution import (
-    ConvolutionArc,
-    ConvolutionSegment,
-    ConvolutionStroke,
-    ConvolutionTriangle,
-)
-from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, Stroke, TaperedBezier
-from .nodes.deformations import Bend, CurveWarp, LimitedTwist, NoiseWarp, Shear, Stretch, Taper
-from .nodes.expressions import Expression
-from .nodes.fields import BoxedField, FieldPrimitive, Gyroid, Noise, Superquadric
-from .nodes.flats import Polygon, Rectangle, Triangle
+from .nodes.contact import ContactSurface
+from .nodes.fields import BoxedField, FieldPrimitive
 from .nodes.node import Node
 from .nodes.numeric_parameters import (
     NumericParameter,
@@ -56,16 +28,9 @@ from .nodes.numeric_parameters import (
 from .nodes.operator import Operator
 from .nodes.outlines import Outline
 from .nodes.parameter_gradient import ParameterGradient
-from .nodes.primitives import Box, Cone, Disc, Point, Primitive, Segment, Torus
-from .nodes.profiles import Extrude, Prism, Revolve
-from .nodes.repeats import EndlessRepeat, PolarRepeat, Repeat
-from .nodes.rounds import RoundDifference, RoundIntersection, RoundUnion
-from .nodes.sharp import Frustum
-from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
-from .nodes.sweeps import Sweep
-from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
+from .nodes.primitives import Primitive
 from .nodes.tree_volumes import sample
-from .nodes.volumes import Volume, from_mesh, from_sdf
+from .nodes.volumes import from_mesh, from_sdf
 from .nodes.warp import Warp
 from .progress import Cancel, Progress
 from .sampling.field_grid import field_grid
@@ -77,99 +42,24 @@ __all__ = [
     "FALLOFF_NAMES",
     "ISO",
     "RIM",
-    "Arc",
-    "Bend",
-    "BlendGraph",
-    "Box",
     "BoxedField",
-    "Bulge",
     "Cancel",
-    "Circle",
-    "CleanUnion",
-    "Cone",
     "ContactSurface",
-    "ControllableBlend",
-    "ConvolutionArc",
-    "ConvolutionSegment",
-    "ConvolutionStroke",
-    "ConvolutionTriangle",
-    "CubicBezier",
     "Curvatures",
-    "CurveWarp",
-    "Cylinder",
-    "Difference",
-    "Disc",
-    "Ellipsoid",
-    "EndlessRepeat",
-    "Expression",
-    "Extrude",
     "Falloff",
     "FieldPrimitive",
     "Fit",
-    "Frustum",
-    "GradientBlend",
-    "Gyroid",
-    "HalfSpace",
     "ImplicitDecalsError",
-    "Intersection",
-    "LimitedTwist",
-    "LocalBlend",
-    "Masked",
     "Mesh",
-    "Mirror",
     "Node",
-    "Noise",
-    "NoiseWarp",
     "NumericParameter",
-    "Offset",
     "Operator",
     "Outline",
     "ParameterGradient",
-    "Point",
-    "PolarRepeat",
-    "Polygon",
     "Polygonizer",
-    "Polyline",
-    "Press",
     "Primitive",
-    "Prism",
     "Progress",
-    "QuadraticBezier",
-    "RDifference",
-    "RIntersection",
-    "RUnion",
-    "RatedUnion",
-    "Rectangle",
-    "Repeat",
-    "Revolve",
-    "Ricci",
-    "RoundDifference",
-    "RoundIntersection",
-    "RoundUnion",
-    "Segment",
-    "Shear",
-    "Shell",
-    "SmoothDifference",
-    "SmoothIntersection",
-    "SolidContact",
-    "Stretch",
-    "Stroke",
-    "Sum",
-    "SuperellipticBlend",
-    "Superquadric",
-    "Sweep",
-    "SymmetricDifference",
     "Tape",
-    "Taper",
-    "TaperedBezier",
-    "Torus",
-    "Transform",
-    "Transition",
-    "Triangle",
-    "Twist",
-    "Union",
-    "Unmasked",
-    "Volume",
     "Warp",
     "__version__",
     "check_kind",
@@ -194,3 +84,4 @@ __all__ = [
     "to_sdf",
     "with_numeric_values",
 ]
+__all__ += library.__all__

@@ -1,8 +1,10 @@
 """What is loaded or computed at first access: the public names of packages, and properties of objects."""
 
+import ast
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Generic, Self, TypeVar, overload
 
 import lazy_loader
@@ -11,13 +13,14 @@ Value = TypeVar("Value")
 
 
 def attach_stub(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package whose stub lists its public names.
+    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a file whose stub lists names of a package.
 
-    Modules are imported at the first use of their names, as by `lazy_loader.attach_stub`. Meanwhile Python's
-    collector of cycles rests: an import makes many objects that all stay, and going through them again and
-    again takes a quarter of its time.
+    Modules are imported at the first use of their names, as by `lazy_loader.attach_stub`, which knows no star
+    imports. Meanwhile Python's collector of cycles rests: an import makes many objects that all stay, and
+    going through them again and again takes a quarter of its time.
     """
-    load, listed, names = lazy_loader.attach_stub(package, file)
+    listed_in = dict(names_of_modules(Path(file).with_suffix(".pyi")))
+    load, listed, names = lazy_loader.attach(package, listed_in.pop("", []), listed_in)
 
     def attribute(name: str) -> Any:
         if not gc.isenabled():  # the user's choice, or an import within another one
@@ -29,6 +32,21 @@ def attach_stub(package: str, file: str) -> tuple[Callable[[str], Any], Callable
             gc.enable()
 
     return attribute, listed, names
+
+
+def names_of_modules(stub: Path) -> dict[str, list[str]]:
+    """Return what a stub imports: names by the modules of its folder that have them, modules under "".
+
+    A star imports what the stub of that module imports.
+    """
+    found: dict[str, list[str]] = {}
+    for statement in ast.parse(stub.read_text(encoding="utf-8")).body:
+        if isinstance(statement, ast.ImportFrom):
+            module, names = statement.module or "", [alias.name for alias in statement.names]
+            starred = names_of_modules(stub.with_name(f"{module}.pyi")) if names == ["*"] else {module: names}
+            for source, more in starred.items():
+                found[source] = [*found.get(source, []), *more]
+    return found
 
 
 @contextmanager

@@ -64,6 +64,7 @@ EXTRAS: dict[str, str] = {
 """The modules of each package that are extras, ``*`` for all."""
 
 LISTS = (
+    "blobtree.library",
     "blobtree.meshing.polygonize",
     "blobtree.nodes.extras",
     "blobtree.nodes.kinds",

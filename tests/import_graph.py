@@ -36,9 +36,10 @@ def names_at_run_time(module: str, path: Path) -> list[str]:
     That are the public names of a package whose stub `blobtree.lazy.attach_stub` reads, and what
     ``import_module`` imports: a text that names a module, or begins with ``{package.__name__}.``.
     """
+    if "= attach_stub(" in path.read_text(encoding="utf-8"):
+        return imported_names(module, path.with_suffix(".pyi"))
     if path.name == "__init__.py":
-        lazy = "attach_stub(" in path.read_text(encoding="utf-8")
-        return imported_names(module, path.with_suffix(".pyi")) if lazy else []
+        return []
     packages = dict(_statements(module, path))
     if not any(name.startswith("importlib") for name in packages.values()):
         return []
@@ -53,7 +54,10 @@ def names_at_run_time(module: str, path: Path) -> list[str]:
 
 
 def _statements(module: str, path: Path) -> list[tuple[str, str]]:
-    """Return the import statements of a file: local names and full names."""
+    """Return the import statements of a file: local names and full names.
+
+    A star in a stub stands for what the stub of that module imports.
+    """
     names: list[tuple[str, str]] = []
     package = module if path.stem == "__init__" else module.rpartition(".")[0]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -63,7 +67,11 @@ def _statements(module: str, path: Path) -> list[tuple[str, str]]:
             base = package.split(".")
             prefix = [".".join(base[: len(base) + 1 - node.level])] if node.level else []
             source = ".".join([*prefix, *([node.module] if node.module else [])])
-            names += [(alias.asname or alias.name, f"{source}.{alias.name}") for alias in node.names]
+            stub = path.with_name(f"{node.module}.pyi")
+            if path.suffix == ".pyi" and node.names[0].name == "*":
+                names += [(source, source), *_statements(source, stub)]
+            else:
+                names += [(alias.asname or alias.name, f"{source}.{alias.name}") for alias in node.names]
     return names
 
 

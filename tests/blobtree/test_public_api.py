@@ -6,7 +6,8 @@ from types import ModuleType
 import pytest
 
 import blobtree
-from blobtree import custom, errors, sampling, tracing
+from blobtree import custom, errors, library, sampling, tracing
+from blobtree.declare.registry import NODE_KINDS, load_libraries
 
 
 def test_public_names_are_sorted_complete_and_documented() -> None:
@@ -18,6 +19,15 @@ def test_public_names_are_sorted_complete_and_documented() -> None:
         if inspect.isclass(value) or inspect.isfunction(value):
             assert value.__doc__, name
             assert value.__module__.startswith("blobtree.")
+
+
+def test_the_library_lists_all_kinds_of_nodes_and_nothing_else() -> None:
+    load_libraries()
+    ours = {kind.__name__: kind for kind in NODE_KINDS.values() if kind.__module__.startswith("blobtree.")}
+    assert library.__all__ == sorted(ours) == dir(library)
+    for name, kind in ours.items():
+        assert getattr(library, name) is getattr(blobtree, name) is kind
+    assert set(library.__all__) < set(blobtree.__all__)
 
 
 def test_the_version_is_that_of_the_distribution() -> None:

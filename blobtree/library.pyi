@@ -1,0 +1,113 @@
+from .nodes.blends import (
+    BlendGraph,
+    CleanUnion,
+    ControllableBlend,
+    GradientBlend,
+    LocalBlend,
+    Masked,
+    Mirror,
+    RDifference,
+    RIntersection,
+    RUnion,
+    Shell,
+    SmoothDifference,
+    SmoothIntersection,
+    SuperellipticBlend,
+    SymmetricDifference,
+    Transition,
+    Unmasked,
+)
+from .nodes.contact import Bulge, Press, RatedUnion, SolidContact
+from .nodes.convolution import ConvolutionArc, ConvolutionSegment, ConvolutionStroke, ConvolutionTriangle
+from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, Stroke, TaperedBezier
+from .nodes.deformations import Bend, CurveWarp, LimitedTwist, NoiseWarp, Shear, Stretch, Taper
+from .nodes.expressions import Expression
+from .nodes.fields import Gyroid, Noise, Superquadric
+from .nodes.flats import Polygon, Rectangle, Triangle
+from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
+from .nodes.profiles import Extrude, Prism, Revolve
+from .nodes.repeats import EndlessRepeat, PolarRepeat, Repeat
+from .nodes.rounds import RoundDifference, RoundIntersection, RoundUnion
+from .nodes.sharp import Frustum
+from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
+from .nodes.sweeps import Sweep
+from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
+from .nodes.volumes import Volume
+
+__all__ = [
+    "Arc",
+    "Bend",
+    "BlendGraph",
+    "Box",
+    "Bulge",
+    "Circle",
+    "CleanUnion",
+    "Cone",
+    "ControllableBlend",
+    "ConvolutionArc",
+    "ConvolutionSegment",
+    "ConvolutionStroke",
+    "ConvolutionTriangle",
+    "CubicBezier",
+    "CurveWarp",
+    "Cylinder",
+    "Difference",
+    "Disc",
+    "Ellipsoid",
+    "EndlessRepeat",
+    "Expression",
+    "Extrude",
+    "Frustum",
+    "GradientBlend",
+    "Gyroid",
+    "HalfSpace",
+    "Intersection",
+    "LimitedTwist",
+    "LocalBlend",
+    "Masked",
+    "Mirror",
+    "Noise",
+    "NoiseWarp",
+    "Offset",
+    "Point",
+    "PolarRepeat",
+    "Polygon",
+    "Polyline",
+    "Press",
+    "Prism",
+    "QuadraticBezier",
+    "RDifference",
+    "RIntersection",
+    "RUnion",
+    "RatedUnion",
+    "Rectangle",
+    "Repeat",
+    "Revolve",
+    "Ricci",
+    "RoundDifference",
+    "RoundIntersection",
+    "RoundUnion",
+    "Segment",
+    "Shear",
+    "Shell",
+    "SmoothDifference",
+    "SmoothIntersection",
+    "SolidContact",
+    "Stretch",
+    "Stroke",
+    "Sum",
+    "SuperellipticBlend",
+    "Superquadric",
+    "Sweep",
+    "SymmetricDifference",
+    "Taper",
+    "TaperedBezier",
+    "Torus",
+    "Transform",
+    "Transition",
+    "Triangle",
+    "Twist",
+    "Union",
+    "Unmasked",
+    "Volume",
+]
