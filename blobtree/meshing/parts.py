@@ -38,6 +38,7 @@ from blobtree.meshing.part_kernels import measure_parts
 from blobtree.meshing.walls import Walls
 from blobtree.progress import Progress
 from blobtree.tape.bounds import leaf_boxes
+from blobtree.tape.grown import GrownModel
 from blobtree.tape.model import ImplicitModel, values_at
 from blobtree.tape.operands import has_walls, leaves_of
 from blobtree.tape.part_sizes import (
@@ -557,7 +558,7 @@ def _last_on_way(
 ) -> tuple[tuple[int, ...], ProgramNode]:
     """Return path and node at the end of the way from the root through children for which `leads` is true."""
     path: tuple[int, ...] = ()
-    node: ProgramNode = tree
+    node: ProgramNode = tree.tree if isinstance(tree, GrownModel) else tree
     while True:
         step = next((at for at, child in enumerate(node.children) if leads(child)), None)
         if step is None:

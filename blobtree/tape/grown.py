@@ -26,20 +26,21 @@ class GrownModel(ImplicitModel):
     """A tree in which leaves are larger, each by a length of its own: on all sides, or across a slab.
 
     The growths are in the leaves' own units, in the order of the program, as are the numbers of slabs.
+    `tree` is the tree with its own sizes.
     """
 
     def __init__(self, tree: ImplicitModel, growths: Float64Array, slabs: IndexArray) -> None:
-        self._tree, self._growths, self._slabs = tree, growths, slabs
+        self.tree, self._growths, self._slabs = tree, growths, slabs
 
     @property
     def children(self) -> tuple[ProgramNode, ...]:
         """The operands of the tree."""
-        return self._tree.children
+        return self.tree.children
 
     @property
     def program_children(self) -> tuple[ProgramNode, ...]:
         """The nodes below the tree in programs."""
-        return self._tree.program_children
+        return self.tree.program_children
 
     @Lazy
     def _program(self) -> list[Instruction]:
@@ -48,7 +49,7 @@ class GrownModel(ImplicitModel):
             replace(step, primitives=[grown(placed, *next(growths)) for placed in step.primitives])
             if isinstance(step, Run)
             else step
-            for step in self._tree._program
+            for step in self.tree._program
         ]
 
 

@@ -1,5 +1,6 @@
 """The rule of covering radii: decals without gaps, of the least radii, some of them moved and turned."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -25,6 +26,8 @@ from decals.scattering.rearrangement import rearranged
 from decals.scattering.sheets import on_single_sheets
 from decals.scattering.sizing import EXPECTED_RADIUS, WithNormals
 from decals.surfaces.surface import unit_rows
+
+_logger = logging.getLogger(__name__)
 
 LARGEST_ON_THIN_PARTS = 6.0
 """Largest covering radius over the expected one where parts may be thinner than decals lie apart.
@@ -90,6 +93,9 @@ the sheet of a nearer decal. Other decals own small pieces there, far from the r
 
 LEAST_BEND = 0.05
 """Least sine between the normals of two faces whose edge is searched along."""
+
+MAX_UNFACED = 0.01
+"""Share of the surface that no decal faces, above which a warning says so."""
 
 ON_PLANE = 0.01
 """Largest distance of a projected point from the plane of a face, in spreads, at which it lies there."""
@@ -199,6 +205,13 @@ def covering_radii(
     if nearest is None:
         nearest = NearestFacing(samples.positions, samples.normals)
     distances, owners = nearest.of(decals.positions, decals.normals, decals.heights)
+    unfaced = float(np.mean(owners < 0)) if len(owners) else 0.0
+    if len(decals) and unfaced > MAX_UNFACED:
+        _logger.warning(
+            "%.0f %% of the surface stay bare, for none of the %d decals faces them; take more decals",
+            100.0 * unfaced,
+            len(decals),
+        )
     limits = _max_radii(distances, owners, len(decals))
     if bounds is not None:
         limits = np.minimum(limits, bounds)

@@ -1,5 +1,6 @@
 """The domain of a relaxation: visible area, density and mask of surfaces, apportionment, initial sampling."""
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias, cast
@@ -20,6 +21,8 @@ from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.space_curve import curve_keys
 from decals.surfaces.surface import Surface, vectors
 from decals.validation import allowed_number, count_number, function_or_none, function_values, real_array
+
+_logger = logging.getLogger(__name__)
 
 AREA_SAMPLES = 16384
 """Samples that estimate the visible area of a surface."""
@@ -388,7 +391,15 @@ def particle_count(count: int | None, spacing: float | None, mass: float) -> int
         raise InvalidScattering(
             f"spacing: {length:g} makes more than {MAX_PARTICLES:,} particles; take a larger one, or a count"
         )
-    return int(round(2.0 * mass / np.sqrt(3.0) / length / length))
+    count = int(round(2.0 * mass / np.sqrt(3.0) / length / length))
+    if count == 0 < mass:
+        largest = np.sqrt(4.0 * mass / np.sqrt(3.0))
+        _logger.warning(
+            "spacing: %g is too large for a particle on this surface; take at most %.4g, or a count",
+            length,
+            largest,
+        )
+    return count
 
 
 def apportion(masses: Float64Array, count: int) -> Int64Array:

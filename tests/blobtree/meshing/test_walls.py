@@ -233,3 +233,11 @@ def test_a_wall_that_cells_cannot_close_leaves_the_other_walls(
     assert areas[centers[:, 0] < 2.0].sum() == pytest.approx(expected, rel=0.06)
     assert "a wall of the Intersection at path (1, 0)" in record.getMessage()
     assert "Difference" not in record.getMessage()
+
+
+@pytest.mark.slow
+def test_a_wall_of_a_thickened_tree_is_named_by_its_own_node(caplog: pytest.LogCaptureFixture) -> None:
+    plate = Box((0, 0, 0), (1, 1, 0.005), radius=0)
+    with caplog.at_level(logging.WARNING):
+        polygonize_parts(Shell(plate, 0.002))
+    assert "a wall of the Shell at path ()" in caplog.text

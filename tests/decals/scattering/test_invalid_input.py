@@ -137,9 +137,16 @@ def test_invalid_spacings(spacing: Any) -> None:
     error_of(Relaxation, BALL, spacing=spacing)
 
 
-def test_spacing_larger_than_the_model_gives_no_particles() -> None:
+def test_spacing_larger_than_the_model_gives_no_particles(caplog: pytest.LogCaptureFixture) -> None:
     assert Relaxation(BALL, spacing=1e30).count == 0
     assert len(scatter(BALL, spacing=1e30)) == 0
+    message = caplog.messages[-1]
+    assert message.startswith("spacing: 1e+30 is too large for a particle on this surface; take at most ")
+    largest = float(message.partition("at most ")[2].partition(",")[0])
+    caplog.clear()
+    assert Relaxation(BALL, spacing=0.999 * largest).count == 1
+    assert not caplog.messages
+    assert Relaxation(BALL, spacing=1.001 * largest).count == 0
 
 
 @pytest.mark.parametrize("wrong", ["x", None, 5, [None], {"a": 1}, [BALL, 5], MeshSurface, np.eye(3)])

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from blobtree import Point, Torus
 from blobtree._typing import Float32Array, Float64Array, Int64Array
-from decals import Relaxation
+from decals import Relaxation, cover, measure
 from decals.scattering import Orientation, gradient_of
 from decals.scattering.covering import RADIUS_MARGIN, covering_radii
 from decals.scattering.domain import OrientedPoints
@@ -51,6 +51,16 @@ def test_covering_radius_of_a_hexagonal_tiling() -> None:
     assert radii[inner] / rim_distance == pytest.approx(
         np.full(inner.sum(), (1 + RADIUS_MARGIN) * 1.271), rel=0.01
     )
+
+
+def test_a_warning_names_the_share_that_no_decal_faces(caplog: pytest.LogCaptureFixture) -> None:
+    ball = Point((0, 0, 0), radius=1.0)
+    covered = [measure(cover([ball], count=count), samples=20_000).coverage for count in (1, 3)]
+    (message,) = caplog.messages
+    share = float(message.partition(" %")[0]) / 100
+    assert "none of the 1 decals faces them" in message
+    assert abs(share + covered[0] - 1.0) < 0.02
+    assert covered[1] == 1.0
 
 
 def test_decals_that_own_no_sample_have_a_radius() -> None:
