@@ -355,6 +355,27 @@
     true,
   );
 
+  // Chromium holds moves of the pointer back until its next frame. While a button is down, the view gets them at once,
+  // if the last one is a frame ago, and not once more with the frame.
+  const FRAME_MS = 16;
+  const moved = { time: 0, x: 0, y: 0 };
+  const note = ({ timeStamp: time, clientX: x, clientY: y }) => Object.assign(moved, { time, x, y });
+  document.addEventListener("pointerrawupdate", (event) => {
+    const late = event.timeStamp - moved.time >= FRAME_MS;
+    if (!late || !event.buttons || !event.isPrimary || !event.target.closest("[role=application]")) return;
+    note(event);
+    event.target.dispatchEvent(new PointerEvent("pointermove", event));
+  });
+  document.addEventListener(
+    "pointermove",
+    (event) => {
+      if (!event.isTrusted || !event.isPrimary) return;
+      if (event.buttons && event.clientX === moved.x && event.clientY === moved.y) event.stopPropagation();
+      else note(event);
+    },
+    true,
+  );
+
   // The page begins in the colours of the system, once its templates follow the state.
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
   setTimeout(() => dark && trame.state.set("theme", "dark"));

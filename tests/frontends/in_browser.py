@@ -245,6 +245,7 @@ async def sandbox(picture: str | None = None) -> None:
             await browser.get_by_role("slider", name="radius").press(f"Control+{key}")
             await until(lambda labels=labels: window.session.labels == labels)  # type: ignore[misc]
         await by_keys(browser)
+        await moves(browser)
         await clicks(browser, window)
         await hovers(browser, window)
         await browser.get_by_role("button", name="Add", exact=True).click()
@@ -317,6 +318,32 @@ async def clicks(browser: Page, window: EditWindow) -> None:
     await until(lambda: state.primitive is None)
     await browser.get_by_text("Point").nth(1).click()
     await until(lambda: state.primitive == (0, (1,)))
+
+
+async def moves(browser: Page) -> None:
+    """During a drag the view gets each place of the pointer once, in Chromium before the next frame."""
+    view = browser.locator("[role=application]")
+    box = await view.bounding_box()
+    assert box is not None
+    await view.evaluate("""view => {
+      window.moves = [];
+      const moved = event => window.moves.push([event.clientX, event.isTrusted]);
+      view.addEventListener("pointermove", moved, true);
+      window.watched = () => (view.removeEventListener("pointermove", moved, true), window.moves);
+    }""")
+    left = round(box["x"]) + 4
+    places = [left + 3 * step for step in (*range(7), *range(5, -1, -1))]  # and back: the view stays
+    await browser.mouse.move(places[0], box["y"] + 4)
+    await browser.mouse.down()
+    for x in places[1:]:
+        await asyncio.sleep(0.05)
+        await browser.mouse.move(x, box["y"] + 4)
+    await asyncio.sleep(0.1)
+    await browser.mouse.up()
+    seen_moves = await browser.evaluate("window.watched()")
+    assert [x for x, _ in seen_moves][-len(places) + 1 :] == places[1:]
+    if CHOSEN.get() == "chromium":
+        assert sum(not trusted for _, trusted in seen_moves) >= 6
 
 
 async def hovers(browser: Page, window: EditWindow) -> None:
