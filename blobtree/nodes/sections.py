@@ -132,10 +132,25 @@ def signed_row(foot: wp.vec3, low: wp.float32, high: wp.float32, edge: wp.vec4, 
 
 @wp.func
 def outline_row(p: wp.vec2, tape: Texels, first: wp.int32) -> wp.vec4:
-    """Return (d, ∇d, nearest edge) of an outline."""
+    """Return (d, ∇d, nearest edge) of an outline.
+
+    Near a corner, distances from both edges differ by less than they are rounded. At an end of an edge,
+    therefore, the next one is taken if its closest point is none of its ends.
+    """
     i = nearest_edge(p, tape, first)
-    at = first + 2 * int(tape[first][0]) + EDGE_TEXELS * i
-    row = signed_row(edge_foot(p, tape[at], 0.0, 1.0), 0.0, 1.0, tape[at], tape[at + 1])
+    edges = first + 2 * int(tape[first][0])
+    at = edges + EDGE_TEXELS * i
+    foot = edge_foot(p, tape[at], 0.0, 1.0)
+    if foot[2] <= 0.0 or foot[2] >= 1.0:
+        link = int(tape[at + 2][1])
+        if foot[2] <= 0.0:
+            link = int(tape[at + 2][0])
+        beside = edge_foot(p, tape[edges + EDGE_TEXELS * link], 0.0, 1.0)
+        if beside[2] > 0.0 and beside[2] < 1.0:
+            i = link
+            at = edges + EDGE_TEXELS * i
+            foot = beside
+    row = signed_row(foot, 0.0, 1.0, tape[at], tape[at + 1])
     return wp.vec4(row[0], row[1], row[2], float(i))
 
 

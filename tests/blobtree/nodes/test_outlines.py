@@ -335,3 +335,19 @@ def test_damaged_fonts_raise_errors_of_ours(seed: int, tmp_path: Path) -> None:
     (tmp_path / "damaged.ttf").write_bytes(damaged)
     with suppress(ImplicitDecalsError):
         Outline.text("Ag", font=tmp_path / "damaged.ttf")
+
+
+def test_gradients_of_an_extrusion_are_exact_at_corners_of_its_curves() -> None:
+    outline = Outline.arcs([(-1, 0), (1, 0)], 1)
+    (loop,) = outline.loops
+    ways = np.roll(loop.points, -1, axis=0) - loop.points
+    along = ways / np.linalg.norm(ways, axis=1)[:, None]
+    normals = np.column_stack([along[:, 1], -along[:, 0]])
+    rng = np.random.default_rng(0)
+    rows = rng.integers(len(along), size=4000)
+    beside = 10.0 ** rng.uniform(-6, -3, (4000, 1)) * along[rows]
+    places = loop.points[rows] + beside + rng.uniform(0.05, 0.4, (4000, 1)) * normals[rows]
+    points = np.column_stack([places, np.ones(4000)]).astype(np.float32)
+    gradients = Extrude(outline, 2.0, radius=0.5).gradient(points)
+    directions = gradients[:, :2] / np.linalg.norm(gradients, axis=1)[:, None]
+    np.testing.assert_allclose(directions, -normals[rows], atol=1e-6)
