@@ -2,6 +2,9 @@
 (() => {
   const { trame } = window;
 
+  // trame's page shows "Loading..." once a file has come. If that is late, the page stays as it is.
+  Object.defineProperty(document.querySelector("#app"), "innerHTML", { set() {} });
+
   // The connection ends with the page, which is no error.
   window.addEventListener("pagehide", () => {
     window.addEventListener("unhandledrejection", (event) => event.preventDefault());

@@ -234,6 +234,8 @@ async def sandbox(picture: str | None = None) -> None:
         plotter, state = window.plotter, digest(window.document)
         browser.on("request", lambda request: requests.append(request.url))
         first = await shows(browser, plotter)
+        await browser.evaluate("document.querySelector('#app').innerHTML = ''")  # as trame's page, if late
+        await expect(browser.locator("[role=application]")).to_be_visible()
         await browser.get_by_text("Point").nth(1).click()
         await until(lambda: window.actions.state.primitive == (0, (1,)))
         for _ in range(3):
