@@ -19,7 +19,7 @@ def attach_stub(package: str, file: str) -> tuple[Callable[[str], Any], Callable
     imports. Meanwhile Python's collector of cycles rests: an import makes many objects that all stay, and
     going through them again and again takes a quarter of its time.
     """
-    listed_in = dict(names_of_modules(Path(file).with_suffix(".pyi")))
+    listed_in = names_of_modules(Path(file).with_suffix(".pyi"))
     load, listed, names = lazy_loader.attach(package, listed_in.pop("", []), listed_in)
 
     def attribute(name: str) -> Any:

@@ -2,7 +2,7 @@
 (() => {
   const { trame } = window;
 
-  // trame's page shows "Loading..." once a file has come. If that is late, the page stays as it is.
+  // trame's page fetches the text "Loading..." and writes it into the app, even after the app is there. This keeps it out.
   Object.defineProperty(document.querySelector("#app"), "innerHTML", { set() {} });
 
   // The connection ends with the page, which is no error.
@@ -358,8 +358,8 @@
     true,
   );
 
-  // Chromium holds moves of the pointer back until its next frame. While a button is down, the view gets them at once,
-  // if the last one is a frame ago, and not once more with the frame.
+  // Chromium holds moves of the pointer back until its next frame. While a button is down, the view gets a move at once
+  // if the last one is a frame old. The same move, which comes again with the frame, is dropped.
   const FRAME_MS = 16;
   const moved = { time: 0, x: 0, y: 0 };
   const note = ({ timeStamp: time, clientX: x, clientY: y }) => Object.assign(moved, { time, x, y });

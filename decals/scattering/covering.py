@@ -208,7 +208,7 @@ def covering_radii(
     unfaced = float(np.mean(owners < 0)) if len(owners) else 0.0
     if len(decals) and unfaced > MAX_UNFACED:
         _logger.warning(
-            "%.0f %% of the surface stay bare, for none of the %d decals faces them; take more decals",
+            "%.0f %% of the surface stays bare: none of the %d decals faces them; take more decals",
             100.0 * unfaced,
             len(decals),
         )
